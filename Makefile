@@ -15,7 +15,7 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     coinor-libcbc-dev libgeos++-dev libjs-leaflet libjs-chart.js jq
 # Captures without poses, Python's module, ROS's node:
 PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
-    libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev
+    libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev libnav-msgs-dev
 # Tests and benchmarks: films, a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
 PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 ffmpeg \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \

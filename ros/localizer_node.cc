@@ -2,20 +2,24 @@
 // topics and parameters.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <nav_msgs/Odometry.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/PointCloud.h>
 #include <std_msgs/String.h>
 
 #include "ros/map_localizer.h"
+#include "ros/velocity.h"
 
 namespace cairn_ros {
 namespace {
@@ -76,6 +80,13 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("log", &p->log);
   reader.Read("log_max_mb_per_day", &p->log_max_mb_per_day);
   reader.Read("diagnostics_period_s", &p->diagnostics_period_s);
+  reader.Read("steer", &p->steer);
+  reader.Read("step_s", &p->step_s);
+  reader.Read("max_speed_m_s", &p->max_speed_m_s);
+  reader.Read("max_turn_deg_s", &p->max_turn_deg_s);
+  reader.Read("stop_after_s", &p->stop_after_s);
+  reader.Read("where", &p->where);
+  reader.Read("where_period_s", &p->where_period_s);
   *wrong = reader.wrong();
   return wrong->empty();
 }
@@ -107,6 +118,18 @@ geometry_msgs::Pose PoseMessage(const double (&position)[3], const double (&orie
   return pose;
 }
 
+geometry_msgs::Point32 PointMessage(const double (&position)[3]) {
+  geometry_msgs::Point32 point;
+  point.x = static_cast<float>(position[0]);
+  point.y = static_cast<float>(position[1]);
+  point.z = static_cast<float>(position[2]);
+  return point;
+}
+
+double HeadingOf(const geometry_msgs::Quaternion& q) {
+  return std::atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z));
+}
+
 class LocalizerNode {
  public:
   LocalizerNode(NodeParameters parameters, MapLocalizer* localizer)
@@ -117,6 +140,12 @@ class LocalizerNode {
     starts_ = node.advertise<sensor_msgs::PointCloud>("starts", 1, true);
     way_ = node.advertise<geometry_msgs::PoseArray>("way", 1, true);
     verdicts_ = node.advertise<std_msgs::String>("verdict", 10);
+    next_ = node.advertise<std_msgs::String>("next", 1, true);
+    if (parameters_.steer) velocity_ = std::make_unique<Velocity>(parameters_.stop_after_s);
+    if (parameters_.where) {
+      places_ = node.advertise<sensor_msgs::PointCloud>("places", 1);
+      odometry_ = node.subscribe("odom", 1000, &LocalizerNode::OnOdometry, this);
+    }
     goals_ = node.subscribe("goal", 1, &LocalizerNode::OnGoal, this);
     progress_ = node.subscribe("progress", 10, &LocalizerNode::OnProgress, this);
     // Only the newest image: queued ones would be old.
@@ -125,10 +154,16 @@ class LocalizerNode {
 
  private:
   void OnImage(const sensor_msgs::Image::ConstPtr& image) {
-    const Image pixels = {image->encoding, image->width,       image->height,
-                          image->step,     image->data.data(), image->data.size()};
+    const Image pixels = {image->encoding,
+                          image->width,
+                          image->height,
+                          image->step,
+                          image->data.data(),
+                          image->data.size(),
+                          image->header.stamp.toSec()};
     if (localizer_->IsLooking() && (image->header.stamp.isZero() || image->header.stamp >= asked_))
       PublishStarts(localizer_->Look(pixels), image->header.stamp);
+    Steer(pixels, image->header.stamp);
     const steady_clock::time_point begin = steady_clock::now();
     const Answer answer = localizer_->Locate(pixels);
     ++num_images_;
@@ -136,13 +171,37 @@ class LocalizerNode {
       ++num_fixes_;
       PublishPose(answer, image->header.stamp);
     }
+    if (answer.places) PublishPlaces(*answer.places, image->header.stamp);
     const std::chrono::duration<double, std::milli> in_all = steady_clock::now() - begin;
     PublishDiagnostics(*image, answer, in_all.count());
+  }
+
+  // A command every step_s, as the servo expects; images that come sooner are for the pose alone.
+  void Steer(const Image& pixels, const ros::Time& stamp) {
+    if (!velocity_) return;
+    if (!localizer_->IsSteering()) return velocity_->Stop();
+    const double now_s = stamp.isZero() ? ros::Time::now().toSec() : stamp.toSec();
+    if (std::abs(now_s - steered_s_) < 0.9 * parameters_.step_s) return;
+    steered_s_ = now_s;
+    const Steered steered = localizer_->Steer(pixels);
+    velocity_->Drive(steered.speed_m_s, steered.turn_rad_s);
+    for (const Starts& known : steered.arrivals) PublishStarts(known, stamp);
+    if (!steered.error.empty()) ROS_ERROR_THROTTLE(10, "%s", steered.error.c_str());
+    steering_ = steered.error.empty() ? steered.state : "error";
+    steering_why_ = steered.error.empty() ? steered.why : steered.error;
+  }
+
+  void OnOdometry(const nav_msgs::Odometry::ConstPtr& message) {
+    const geometry_msgs::Pose& pose = message->pose.pose;
+    if (!localizer_->AddOdometry(message->header.stamp.toSec(), pose.position.x, pose.position.y,
+                                 HeadingOf(pose.orientation)))
+      ROS_ERROR_THROTTLE(10, "odometry that is not finite does not count");
   }
 
   // An image that was taken before does not count.
   void OnGoal(const std_msgs::String::ConstPtr& image) {
     asked_ = ros::Time::now();
+    if (velocity_) velocity_->Stop();
     PublishStarts(localizer_->SetGoal(image->data), asked_);
   }
 
@@ -161,11 +220,7 @@ class LocalizerNode {
     starts.channels[1].name = "is_followed";
     for (size_t i = 0; i < found.starts.size(); ++i) {
       const Starts::Start& start = found.starts[i];
-      geometry_msgs::Point32 point;
-      point.x = static_cast<float>(start.pose.position[0]);
-      point.y = static_cast<float>(start.pose.position[1]);
-      point.z = static_cast<float>(start.pose.position[2]);
-      starts.points.push_back(point);
+      starts.points.push_back(PointMessage(start.pose.position));
       starts.channels[0].values.push_back(static_cast<float>(start.posterior));
       starts.channels[1].values.push_back(static_cast<int>(i) == found.followed ? 1 : 0);
     }
@@ -178,6 +233,27 @@ class LocalizerNode {
     starts_.publish(starts);
     way_.publish(way);
     verdicts_.publish(verdict);
+    std_msgs::String next;
+    next.data = found.next;
+    next_.publish(next);
+    next_name_ = found.next;
+  }
+
+  void PublishPlaces(const Places& found, const ros::Time& stamp) {
+    if (!found.error.empty()) ROS_ERROR_THROTTLE(10, "%s", found.error.c_str());
+    likely_place_ = found.places.empty() ? Places::Place() : found.places[0];
+    elsewhere_ = found.elsewhere;
+    if (!found.error.empty()) return;
+    sensor_msgs::PointCloud places;
+    places.header.stamp = stamp;
+    places.header.frame_id = parameters_.map_frame;
+    places.channels.resize(1);
+    places.channels[0].name = "probability";
+    for (const Places::Place& place : found.places) {
+      places.points.push_back(PointMessage(place.pose.position));
+      places.channels[0].values.push_back(static_cast<float>(place.probability));
+    }
+    places_.publish(places);
   }
 
   void PublishPose(const Answer& answer, const ros::Time& stamp) {
@@ -216,7 +292,17 @@ class LocalizerNode {
                      KeyValue("library_ms", answer.library_ms),
                      KeyValue("node_ms", node_ms),
                      KeyValue("kept_bytes", localizer_->num_kept_bytes()),
-                     KeyValue("logged", localizer_->num_logged())};
+                     KeyValue("logged", localizer_->num_logged()),
+                     KeyValue("next", next_name_)};
+    if (velocity_) {
+      status.values.push_back(KeyValue("steering", localizer_->IsSteering() ? steering_ : "off"));
+      status.values.push_back(KeyValue("steering_why", steering_why_));
+    }
+    if (parameters_.where) {
+      status.values.push_back(KeyValue("place", likely_place_.pose.image));
+      status.values.push_back(KeyValue("place_probability", likely_place_.probability));
+      status.values.push_back(KeyValue("elsewhere", elsewhere_));
+    }
     diagnostic_msgs::DiagnosticArray message;
     message.header.stamp = image.header.stamp;
     message.status = {status};
@@ -225,8 +311,13 @@ class LocalizerNode {
 
   NodeParameters parameters_;
   MapLocalizer* localizer_;
-  ros::Publisher poses_, diagnostics_, starts_, way_, verdicts_;
-  ros::Subscriber images_, goals_, progress_;
+  ros::Publisher poses_, diagnostics_, starts_, way_, verdicts_, next_, places_;
+  ros::Subscriber images_, goals_, progress_, odometry_;
+  std::unique_ptr<Velocity> velocity_;  // null: the robot is not steered
+  double steered_s_ = 0;                // when the image of the last command was taken
+  std::string next_name_, steering_, steering_why_;
+  Places::Place likely_place_;
+  double elsewhere_ = 1;
   ros::Time asked_;  // when a goal or a report came last
   int64_t num_images_ = 0, num_fixes_ = 0;
   int last_level_ = -1;

@@ -7,6 +7,8 @@
 #include "ros/grey_pixels.h"
 #include "ros/robot_pose.h"
 #include "ros/start_finder.h"
+#include "ros/steerer.h"
+#include "ros/whereabouts.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 #include "runtime/robot_log/shared_log.h"
@@ -56,7 +58,7 @@ struct MapLocalizer::State {
         robot_from_camera(mounting),
         localizer(map),
         tracker(map),
-        starts(map, mounting) {}
+        starts(map, mounting, parameters.steer) {}
 
   Parameters parameters;
   std::shared_ptr<const Map> map;
@@ -64,7 +66,23 @@ struct MapLocalizer::State {
   Localizer localizer;
   RegionTracker tracker;
   StartFinder starts;
-  std::shared_ptr<SharedLog> log;  // null: none
+  std::shared_ptr<SharedLog> log;          // null: none
+  std::optional<Steerer> steerer;          // with Parameters::steer
+  std::optional<Whereabouts> whereabouts;  // with Parameters::where
+
+  // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, SharedLog::Open.
+  Status Begin() {
+    if (parameters.steer) {
+      CAIRN_ASSIGN_OR_RETURN(steerer, Steerer::Make(map, parameters, robot_from_camera));
+    }
+    if (parameters.where) {
+      CAIRN_ASSIGN_OR_RETURN(whereabouts,
+                             Whereabouts::Make(map, robot_from_camera, parameters.where_period_s));
+    }
+    if (parameters.log.empty()) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(log, SharedLog::Open(parameters.log, *map, parameters.log_max_mb_per_day));
+    return Ok();
+  }
 
   Result<Camera> CameraFor(const cv::Mat& grey) const {
     if (parameters.camera_model.empty()) return map->CameraForSize(grey.cols, grey.rows);
@@ -76,24 +94,57 @@ struct MapLocalizer::State {
     return camera;
   }
 
-  Result<Localization> LocateAndLog(const cv::Mat& grey, const Camera& camera) {
+  // By the features that a log and a belief need, too.
+  Result<Localization> LocateByFeatures(const cv::Mat& grey, const Camera& camera, double stamp_s,
+                                        std::optional<Places>* places) {
     CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
     CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow
                                                    ? tracker.TrackFeatures(query.features, camera)
                                                    : localizer.LocalizeQuery(query, std::nullopt));
-    log->Offer(query, found);
+    if (log) log->Offer(query, found);
+    if (!whereabouts || !whereabouts->IsDue(stamp_s)) return found;
+    if (!parameters.follow) {
+      *places = whereabouts->See(query, found, stamp_s);
+      return found;
+    }
+    // What a tracker expected has been in the belief already: the image by itself counts.
+    CAIRN_ASSIGN_OR_RETURN(const Localization alone, localizer.LocalizeQuery(query, std::nullopt));
+    *places = whereabouts->See(query, alone, stamp_s);
     return found;
   }
 
-  Result<Localization> Locate(const Image& image, double* library_ms) {
+  Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places) {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
     const auto begin = std::chrono::steady_clock::now();
-    Result<Localization> found = log                 ? LocateAndLog(grey, camera)
+    Result<Localization> found = log || whereabouts  ? LocateByFeatures(grey, camera, image.stamp_s, places)
                                  : parameters.follow ? tracker.Track(grey, camera)
                                                      : localizer.Localize(grey, camera);
     *library_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     return found;
+  }
+
+  // Passes all images at which the robot has arrived; the command is that for the one after them.
+  Status Steer(const Image& image, Steered* steered) {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixelsOf(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
+    CAIRN_ASSIGN_OR_RETURN(const Features seen, steerer->See(grey));
+    for (int32_t next = starts.Next(); next >= 0; next = starts.Next()) {
+      CAIRN_ASSIGN_OR_RETURN(const ServoCommand command,
+                             steerer->Step(next, starts.IsGoalNext(), seen, camera));
+      steered->speed_m_s = command.speed_m_s;
+      steered->turn_rad_s = command.turn_rad_s;
+      steered->state = ServoStateName(command.state);
+      steered->why = command.why;
+      steered->num_matches = command.num_matches;
+      if (command.state != ServoState::kArrived) return Ok();
+      CAIRN_RETURN_IF_ERROR(starts.Report("arrived"));
+      CAIRN_RETURN_IF_ERROR(starts.Look(grey, camera));
+      steerer->Forget();
+      CAIRN_ASSIGN_OR_RETURN(Starts known, starts.Found());
+      steered->arrivals.push_back(std::move(known));
+    }
+    return Ok();
   }
 };
 
@@ -112,17 +163,13 @@ std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, i
   const auto map = OpenMap(parameters);
   if (!map.ok()) return fail(map.error());
   auto state = std::make_unique<State>(parameters, *map, *mounting);
-  if (!parameters.log.empty()) {
-    const auto log = SharedLog::Open(parameters.log, **map, parameters.log_max_mb_per_day);
-    if (!log.ok()) return fail(log.error());
-    state->log = *log;
-  }
+  if (const Status begun = state->Begin(); !begun.ok()) return fail(begun.error());
   return std::unique_ptr<MapLocalizer>(new MapLocalizer(std::move(state)));
 }
 
 Answer MapLocalizer::Locate(const Image& image) {
   Answer answer;
-  const Result<Localization> found = state_->Locate(image, &answer.library_ms);
+  const Result<Localization> found = state_->Locate(image, &answer.library_ms, &answer.places);
   if (!found.ok()) {
     answer.is_error = true;
     answer.reason = ErrorCodeName(found.error().code);
@@ -158,10 +205,12 @@ Starts AnswerOf(const StartFinder& finder, const Status& done) {
 }  // namespace
 
 Starts MapLocalizer::SetGoal(const std::string& image) {
+  if (state_->steerer) state_->steerer->Forget();
   return AnswerOf(state_->starts, state_->starts.SetGoal(image));
 }
 
 Starts MapLocalizer::Report(const std::string& word) {
+  if (state_->steerer) state_->steerer->Forget();
   return AnswerOf(state_->starts, state_->starts.Report(word));
 }
 
@@ -170,7 +219,27 @@ bool MapLocalizer::IsLooking() const { return state_->starts.IsWaiting(); }
 Starts MapLocalizer::Look(const Image& image) {
   const Result<cv::Mat> grey = GreyPixelsOf(image);
   if (!grey.ok()) return AnswerOf(state_->starts, grey.error());
-  return AnswerOf(state_->starts, state_->starts.Look(*grey));
+  const Result<Camera> camera = state_->CameraFor(*grey);
+  return AnswerOf(state_->starts,
+                  state_->starts.Look(*grey, camera.ok() ? std::optional(*camera) : std::nullopt));
+}
+
+bool MapLocalizer::IsSteering() const {
+  return state_->steerer && !state_->starts.IsWaiting() && state_->starts.Next() >= 0;
+}
+
+Steered MapLocalizer::Steer(const Image& image) {
+  Steered steered;
+  const Status done = state_->Steer(image, &steered);
+  if (done.ok()) return steered;
+  steered.error = done.error().message;
+  steered.speed_m_s = steered.turn_rad_s = 0;
+  steered.state = ServoStateName(ServoState::kLost);
+  return steered;
+}
+
+bool MapLocalizer::AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad) {
+  return !state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, {{x_m, y_m}, heading_rad}).ok();
 }
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,15 @@ struct Parameters {
   std::vector<double> camera_params;
   std::string log;  // folder of a log (docs/robots.md); empty: none
   double log_max_mb_per_day = 50;
+  // On its way to a goal the robot is steered (steerer.h): at most so fast, a command every step_s.
+  bool steer = false;
+  double step_s = 0.25;
+  double max_speed_m_s = 0.5;
+  double max_turn_deg_s = 60;
+  double stop_after_s = 1;  // without an image it drives no longer
+  // Which places the robot may be at is kept in mind (whereabouts.h), by an image every so many seconds.
+  bool where = false;
+  double where_period_s = 1;
 };
 
 struct Image {
@@ -30,6 +40,25 @@ struct Image {
   uint32_t width = 0, height = 0, step = 0;
   const uint8_t* bytes = nullptr;
   size_t num_bytes = 0;
+  double stamp_s = 0;  // when it was taken; 0: now
+};
+
+// Where a survey image was taken: the robot's base there, or the camera without a mounting.
+struct SurveyPose {
+  std::string image;
+  double position[3] = {0, 0, 0};
+  double orientation_xyzw[4] = {0, 0, 0, 1};
+};
+
+// Where a robot may be, after an image.
+struct Places {
+  std::string error;  // why the image did not count; empty: it did
+  struct Place {
+    SurveyPose pose;
+    double probability = 0;
+  };
+  std::vector<Place> places;  // the likeliest first; with `elsewhere` they sum to 1
+  double elsewhere = 0;       // P(at no place of the map)
 };
 
 struct Answer {
@@ -41,21 +70,15 @@ struct Answer {
   double orientation_xyzw[4] = {0, 0, 0, 1};
   double covariance[36] = {0};  // x, y, z, rotation about the map's x, y, z
   int num_features = 0, num_inliers = 0, region = -1;
-  double probability = 0;  // that the fix is right
-  double library_ms = 0;   // in the runtime: the rest is the node's
-};
-
-// Where a survey image was taken: the robot's base there, or the camera without a mounting.
-struct SurveyPose {
-  std::string image;
-  double position[3] = {0, 0, 0};
-  double orientation_xyzw[4] = {0, 0, 0, 1};
+  double probability = 0;        // that the fix is right
+  double library_ms = 0;         // in the runtime: the rest is the node's
+  std::optional<Places> places;  // of an image by which whereabouts were looked for
 };
 
 // Where a robot may have started.
 struct Starts {
   std::string error;    // why the last goal, report or image was not taken; empty: it was
-  std::string verdict;  // "follow", "switch" or "lost"; empty before the first image
+  std::string verdict;  // "follow", "switch", "lost" or "goal"; empty before the first image
   struct Start {
     SurveyPose pose;
     double posterior = 0;
@@ -63,6 +86,18 @@ struct Starts {
   std::vector<Start> starts;
   int followed = -1;
   std::vector<SurveyPose> way;  // from the followed start to the goal
+  std::string next;             // the survey image that the robot goes to next; empty: none
+};
+
+// How a robot is to drive until the next image.
+struct Steered {
+  std::string error;      // why the image could not be tried: the robot stands
+  double speed_m_s = 0;   // ahead
+  double turn_rad_s = 0;  // to the left
+  std::string state;      // "turning", "approaching", "arrived" (at the goal) or "lost": it stands
+  std::string why;        // a sentence
+  int num_matches = 0;
+  std::vector<Starts> arrivals;  // what was known after each image that it passed
 };
 
 class MapLocalizer {
@@ -78,6 +113,13 @@ class MapLocalizer {
   Starts Report(const std::string& word);
   bool IsLooking() const;  // whether the next image is to go to Look
   Starts Look(const Image& image);
+  // Whether the next image is to go to Steer: with a goal, the way to it known, and Parameters::steer.
+  bool IsSteering() const;
+  // Passes as many images of the way as it has arrived at.
+  Steered Steer(const Image& image);
+
+  // Where odometry has the robot: metres, radians to the left, in a frame of its own.  False: not finite.
+  bool AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad);
 
   std::string map_name() const;
   int64_t num_landmarks() const;

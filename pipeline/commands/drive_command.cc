@@ -80,7 +80,7 @@ nlohmann::ordered_json LegJson(const sim::DriveLeg& leg) {
                              {"speed_m_s", step.command.speed_m_s},
                              {"turn_deg_s", DegFromRad(step.command.turn_rad_s)},
                              {"state", ServoStateName(step.command.state)},
-                             {"num_matches", step.num_matches}});
+                             {"num_matches", step.command.num_matches}});
   }
   return json;
 }

@@ -1,6 +1,6 @@
 /* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, or a tracker for frames
  * in order, and hand it grey pixels.  Where did it start?  Several starts, kept in mind on the way to a goal.
- * In which of many maps is it?  An atlas.
+ * How does it get from survey image to survey image?  A servo.  In which of many maps is it?  An atlas.
  *
  * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
  * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
@@ -11,10 +11,10 @@
  * added.  Structs begin with their size and only grow at their end: set `size` to sizeof the struct before
  * every call (CAIRN_FIX_INIT and the like do), and the library touches no more than that.
  *
- * Threads: a map is shared by all; a localizer, a tracker, a place model or starts are for one thread at a
- * time. Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x right, y
- * down; poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the frame of
- * the surveyed capture.
+ * Threads: a map is shared by all; a localizer, a tracker, a place model, starts or a servo are for one
+ * thread at a time.  Frames and units: metres, radians unless a name says otherwise; the camera looks along
+ * +z, x right, y down; poses are cam_from_world (point_in_camera = rotation * point_in_world + translation)
+ * in the frame of the surveyed capture.
  */
 #ifndef CAIRN_RUNTIME_CAIRN_H_
 #define CAIRN_RUNTIME_CAIRN_H_
@@ -92,6 +92,14 @@ enum {
   CAIRN_VERDICT_LOST = 2    /* no possible start explains the image: localize again */
 };
 
+/* What a servo does.  Append-only. */
+enum {
+  CAIRN_SERVO_TURNING = 0, /* on the spot */
+  CAIRN_SERVO_APPROACHING = 1,
+  CAIRN_SERVO_ARRIVED = 2,
+  CAIRN_SERVO_LOST = 3 /* the target is not in sight: the robot stands */
+};
+
 /* Handles.  They are numbers, not addresses: a closed one is never mistaken for another. */
 typedef struct cairn_map cairn_map;
 typedef struct cairn_localizer cairn_localizer;
@@ -101,6 +109,7 @@ typedef struct cairn_log cairn_log;
 typedef struct cairn_place_model cairn_place_model;
 typedef struct cairn_start_hypotheses cairn_start_hypotheses;
 typedef struct cairn_place_belief cairn_place_belief;
+typedef struct cairn_servo cairn_servo;
 typedef struct cairn_atlas cairn_atlas;
 typedef struct cairn_atlas_localizer cairn_atlas_localizer;
 
@@ -270,6 +279,23 @@ typedef struct cairn_start_hypothesis {
 #define CAIRN_START_HYPOTHESIS_INIT \
   { sizeof(cairn_start_hypothesis), 0, 0, 0, 0, 0, 0, 0 }
 
+/* How a robot is to drive until the next image. */
+typedef struct cairn_servo_command {
+  size_t size;
+  double speed_m_s;    /* ahead; negative: backwards */
+  double turn_rad_s;   /* to the left */
+  double step_s;       /* for so long (option step_s): a robot without another command by then stops */
+  int32_t state;       /* CAIRN_SERVO_APPROACHING, ... */
+  int32_t num_matches; /* with what the target shows */
+  int32_t num_inliers; /* of these, that agree on one motion */
+  int32_t reserved;    /* 0 */
+  char why[CAIRN_MESSAGE_BYTES]; /* a sentence; cut to fit, always with a NUL */
+} cairn_servo_command;
+#define CAIRN_SERVO_COMMAND_INIT                                           \
+  {                                                                        \
+    sizeof(cairn_servo_command), 0, 0, 0, CAIRN_SERVO_LOST, 0, 0, 0, { 0 } \
+  }
+
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
 /* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES, "track" for CAIRN_SCOPE_TRACK;
@@ -279,6 +305,8 @@ CAIRN_API const char* cairn_reason_name(int32_t reason);
 CAIRN_API const char* cairn_scope_name(int32_t scope);
 /* "follow", "switch", "lost". */
 CAIRN_API const char* cairn_verdict_name(int32_t verdict);
+/* "turning", "approaching", "arrived", "lost". */
+CAIRN_API const char* cairn_servo_state_name(int32_t state);
 /* The message of this thread's last failed call: says what was found and what to do.  Never NULL; valid until
  * this thread's next call of the library. */
 CAIRN_API const char* cairn_last_error(void);
@@ -474,6 +502,27 @@ CAIRN_API int32_t cairn_place_belief_places(const cairn_place_belief* belief, in
                                             double* probabilities, int32_t capacity, int32_t* num_places,
                                             double* elsewhere);
 CAIRN_API int32_t cairn_place_belief_destroy(cairn_place_belief* belief);
+
+/* Steers a robot with wheels to where a survey image was taken, by its camera alone (docs/active.md): the
+ * camera looks ahead, at the height of the survey's.  No odometry, and a focal length that may be wrong by a
+ * fifth.  One for each image of a way.  CAIRN_INVALID_ARGUMENT: no such
+ * image; CAIRN_NO_DATA: it shows no landmarks. */
+CAIRN_API int32_t cairn_servo_create(const cairn_map* map, int32_t image, cairn_servo** servo);
+/* Where the camera is on the robot ("camera_ahead_m" and "camera_left_m" of the middle of its axle,
+ * "camera_turn_deg"; without: above it, and it looks ahead), how it drives ("max_speed_m_s", "step_s", ...),
+ * when it has arrived ("arrive_distance_ratio", "arrive_heading_deg"; for an image on the way 0.04 and 4 will
+ * do), what it takes for a motion ("min_num_inliers", ...) and what is looked for in images
+ * ("max_num_features", ...).  The servo begins anew; after an error it is as before. */
+CAIRN_API int32_t cairn_servo_set_option(cairn_servo* servo, const char* name, const char* value);
+/* The command after an image, which should come every step_s; `camera` NULL: the survey's camera of the
+ * image's size, and the same for all images of a servo.  A target that is not in sight is no error, but
+ * CAIRN_SERVO_LOST: the next image may show it again.  After an error *command stops the robot, and the servo
+ * is as before. */
+CAIRN_API int32_t cairn_servo_step(cairn_servo* servo, const cairn_image* image, const cairn_camera* camera,
+                                   cairn_servo_command* command);
+/* The last command did not move the robot, since something stands in the way: it goes the other way. */
+CAIRN_API int32_t cairn_servo_blocked(cairn_servo* servo);
+CAIRN_API int32_t cairn_servo_destroy(cairn_servo* servo);
 
 /* Many maps of a site as one (`cairn atlas`): in which of them was an image taken?  Reads the atlas alone; a
  * map's file is opened when it is needed, and must be the one that the atlas was made of (CAIRN_OTHER_MAP).

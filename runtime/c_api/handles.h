@@ -8,7 +8,7 @@
 namespace cairn {
 
 // How many kinds of handles there are, and the number of each, which differ modulo that.
-inline constexpr uint64_t kNumHandleKinds = 10;
+inline constexpr uint64_t kNumHandleKinds = 11;
 enum class HandleKind : uint64_t {
   kMap = 1,
   kLocalizer = 2,
@@ -19,7 +19,8 @@ enum class HandleKind : uint64_t {
   kStartHypotheses = 7,
   kPlaceBelief = 8,
   kAtlas = 9,
-  kAtlasLocalizer = 10
+  kAtlasLocalizer = 10,
+  kServo = 11
 };
 
 // Handles that another language holds: `Handle` is an opaque C type, never defined.  A handle is a number

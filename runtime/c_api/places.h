@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
-#include "runtime/c_api/place_options.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/drive/place_model.h"
 #include "runtime/map/map.h"
 

@@ -6,8 +6,8 @@
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
 #include "runtime/c_api/logs.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/c_api/structs.h"
-#include "runtime/c_api/tracker_options.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 

@@ -9,7 +9,7 @@
 #include "runtime/atlas/atlas_localizer.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
-#include "runtime/c_api/place_options.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/c_api/structs.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/localize/localizer.h"

@@ -62,6 +62,10 @@ OptionTable DescribeOptions(ServoOptions* o) {
        "with fewer matches the robot looks along the target's heading, the fewer the straighter", 4},
       {"scene_distance_m", &o->scene_distance_m, "distance of the scene before anything is known, metres",
        0.01, 1000},
+      {"camera_ahead_m", &o->camera_ahead_m, "the camera's place ahead of the middle of the axle, metres", -2,
+       2},
+      {"camera_left_m", &o->camera_left_m, "the camera's place to the left of it, metres", -2, 2},
+      {"camera_turn_deg", &o->camera_turn_deg, "how far the camera is turned to the left, degrees", -45, 45},
   };
 }
 
@@ -111,11 +115,27 @@ void Servo::LearnFocal(const PlanarEpipoles& epipoles) {
   known.focal_error_ratio = std::max(kLeastFocalError, 1 / std::sqrt(before + added));
 }
 
+bool Servo::IsCameraOnAxle() const {
+  return options_.camera_ahead_m == 0 && options_.camera_left_m == 0 && options_.camera_turn_deg == 0;
+}
+
+PlanarPose Servo::AxleInTarget(const PlanarEpipoles& epipoles) const {
+  PlanarPose pose = epipoles.PoseInTarget();
+  if (IsCameraOnAxle()) return pose;
+  const Eigen::Vector2d camera =
+      Eigen::Vector2d(options_.camera_ahead_m, options_.camera_left_m) / scene_distance_m();
+  const Eigen::Rotation2Dd turn(RadFromDeg(options_.camera_turn_deg));
+  pose.position = turn * pose.position + camera - Eigen::Rotation2Dd(pose.heading_rad) * camera;
+  return pose;
+}
+
 // The last command should have moved the robot by a known way along its heading.
 void Servo::LearnScale(const PlanarPose& pose) {
   if (!last_ || last_speed_m_s_ == 0) return;
   const PlanarPose before = last_->PoseInTarget();
-  const double heading = before.heading_rad + 0.5 * WrapAngle(pose.heading_rad - before.heading_rad);
+  // Where the robot drives, in the target's camera.
+  const double heading = before.heading_rad + 0.5 * WrapAngle(pose.heading_rad - before.heading_rad) -
+                         RadFromDeg(options_.camera_turn_deg);
   const double ratio =
       (pose.position - before.position).dot(Eigen::Vector2d(std::cos(heading), std::sin(heading)));
   const double way_m = last_speed_m_s_ * options_.step_s;
@@ -130,7 +150,7 @@ double Servo::Patience() const {
 
 void Servo::Blocked() {
   if (!last_ || last_speed_m_s_ == 0) return;
-  const PlanarPose pose = last_->PoseInTarget();
+  const PlanarPose pose = AxleInTarget(*last_);
   leg_ = last_speed_m_s_ > 0 ? Leg::kRetreat : Leg::kToHeightOfTarget;
   leg_side_ = Sign(pose.position.y());
   blocked_at_ = pose.position;
@@ -186,7 +206,7 @@ double Servo::WantedHeading(const PlanarPose& pose, int num_inliers) const {
 }
 
 ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {
-  ServoCommand command;
+  ServoCommand command{.num_matches = static_cast<int>(pairs.size())};
   std::vector<RayPair> rays;
   for (const PixelPair& pair : pairs) {
     if (!pair.current_px.allFinite() || !pair.target_px.allFinite()) continue;
@@ -203,13 +223,13 @@ ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {
     return command;
   }
   command.epipoles = *epipoles;
-  const PlanarPose pose = epipoles->PoseInTarget();
-  LearnScale(pose);
+  LearnScale(epipoles->PoseInTarget());
   LearnFocal(*epipoles);
   last_ = std::move(*epipoles);
   last_speed_m_s_ = 0;
 
-  const double distance = last_->distance_ratio;
+  const PlanarPose pose = AxleInTarget(*last_);
+  const double distance = IsCameraOnAxle() ? last_->distance_ratio : pose.position.norm();
   const bool is_there = distance <= options_.arrive_distance_ratio * Patience();
   const double max_turn = RadFromDeg(options_.arrive_heading_deg) * Patience();
   num_commands_ += num_commands_ > 0 || distance <= kNearRatio * options_.arrive_distance_ratio;

@@ -37,6 +37,10 @@ namespace cairn {
 // there it goes the other way.  The focal length that matches show is remembered from image to image.  Only
 // the speed depends on a scale: the scene's distance is learnt from the way that the robot's commands should
 // have covered, beginning with scene_distance_m.
+//
+// All of that is about the middle of the robot's axle, which is where it turns about, on the way to where it
+// was when the camera took the target's image.  With M the camera on the robot and T the camera in the
+// target's camera (both over the floor, in units of the scene's distance), it stands at M T M^-1.
 struct ServoOptions {
   // Greatest speed, m/s, and turn rate, degrees/s.  REQUIRES: > 0
   double max_speed_m_s = 0.5;
@@ -67,6 +71,11 @@ struct ServoOptions {
   // Distance of the scene before anything is known, metres: too small is slow, too large may
   // overshoot.  REQUIRES: > 0
   double scene_distance_m = 1;
+  // Where the camera is on the robot: ahead and to the left of the middle of its axle, metres, turned to the
+  // left, degrees.  REQUIRES: in [-2, 2], in [-45, 45]
+  double camera_ahead_m = 0;
+  double camera_left_m = 0;
+  double camera_turn_deg = 0;
   PlanarEpipolesOptions epipoles;
 };
 OptionTable DescribeOptions(ServoOptions* options);
@@ -84,6 +93,7 @@ struct ServoCommand {
   double speed_m_s = 0;   // negative: backwards
   double turn_rad_s = 0;  // left positive
   ServoState state = ServoState::kLost;
+  int num_matches = 0;                     // that were given
   std::string why;                         // a sentence
   std::optional<PlanarEpipoles> epipoles;  // none when lost
 };
@@ -112,6 +122,9 @@ class Servo {
 
  private:
   Servo(const Camera& camera, const ServoOptions& options);
+  // The middle of the axle in the target's frame, over the scene's distance.
+  PlanarPose AxleInTarget(const PlanarEpipoles& epipoles) const;
+  bool IsCameraOnAxle() const;
   void LearnFocal(const PlanarEpipoles& epipoles);
   void LearnScale(const PlanarPose& pose);
   void ChooseLeg(const PlanarPose& pose);

@@ -12,7 +12,7 @@
 
 #include "runtime/atlas/atlas.h"
 #include "runtime/atlas/atlas_localizer.h"
-#include "runtime/c_api/place_options.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/python/objects.h"
 
 namespace py = pybind11;

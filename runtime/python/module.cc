@@ -15,6 +15,7 @@
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
 #include "runtime/python/places.h"
+#include "runtime/python/servos.h"
 #include "runtime/python/trackers.h"
 
 namespace py = pybind11;
@@ -261,5 +262,6 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindLocalizer(module);
   cairn::BindTrackers(module);
   cairn::BindPlaces(module);
+  cairn::BindServos(module);
   cairn::BindAtlases(module);
 }

@@ -11,7 +11,7 @@
 #include <pybind11/stl.h>
 
 #include "core/features/sift.h"
-#include "runtime/c_api/place_options.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/drive/route.h"
 #include "runtime/drive/start_hypotheses.h"

@@ -8,7 +8,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include "runtime/c_api/tracker_options.h"
+#include "runtime/c_api/named_options.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"

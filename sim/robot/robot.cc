@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/random.h"
 #include "core/blocks/map_rows.h"
-#include "core/features/descriptor_matcher.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
-#include "runtime/map/landmark_set.h"
 #include "sim/survey/survey.h"
 
 namespace cairn::sim {
@@ -18,16 +17,6 @@ namespace {
 constexpr double kSearchDeg[] = {20, -20, 40, -40, 60, -60};
 // Number of blocked commands on the way to one image after which the robot gives up.
 constexpr int kMaxNumBlocked = 8;
-constexpr DescriptorMatcherOptions kMatcher{.max_ratio = 0.85, .max_angle_rad = 0.8};
-
-std::vector<PixelPair> MatchPixels(const Features& seen, const ServoTarget& target) {
-  std::vector<PixelPair> pairs;
-  for (const Match& match : MatchDescriptors(seen.descriptors, target.descriptors, kMatcher)) {
-    const Keypoint& keypoint = seen.keypoints[match.idx1];
-    pairs.push_back({{keypoint.x, keypoint.y}, target.pixels[match.idx2]});
-  }
-  return pairs;
-}
 
 }  // namespace
 
@@ -46,12 +35,9 @@ OptionTable DescribeOptions(RobotOptions* o) {
       {"focal_ratio", &o->focal_ratio, "focal length that the servo assumes over the camera's", 0.5, 2},
       {"radius_m", &o->radius_m, "radius of the robot, metres", 0, 2},
       {"max_num_commands", &o->max_num_commands, "most commands to one image", 1},
-      {"pass_distance_ratio", &o->pass_distance_ratio,
-       "distance at which images on the way count as reached, over that of the scene", 1e-4, 1},
-      {"pass_heading_deg", &o->pass_heading_deg, "turn at which images on the way count as reached, degrees",
-       1e-3, 45},
   };
-  for (const OptionTable& part : {DescribeOptions(&o->sensors), DescribeOptions(&o->sift)}) {
+  for (const OptionTable& part :
+       {DescribeOptions(&o->pass), DescribeOptions(&o->sensors), DescribeOptions(&o->sift)}) {
     table.insert(table.end(), part.begin(), part.end());
   }
   return table;
@@ -62,23 +48,10 @@ PlanarPose PlanarPoseOf(const Pose& cam_from_world) {
   return {pose.position, WrapAngle(RadFromDeg(pose.heading_deg))};
 }
 
-Result<ServoTarget> TargetOfImage(const Map& map, int32_t image_idx) {
+Result<RobotTarget> RobotTargetOf(const Map& map, int32_t image_idx) {
+  CAIRN_ASSIGN_OR_RETURN(ServoTarget target, TargetOfImage(map, image_idx));
   CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(image_idx));
-  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(image->landmarks, false));
-  const auto camera = std::find_if(map.head().cameras.begin(), map.head().cameras.end(),
-                                   [&](const Camera& c) { return c.camera_id == image->camera_id; });
-  ServoTarget target;
-  target.pose = PlanarPoseOf(image->cam_from_world);
-  std::vector<Eigen::Index> rows;
-  for (size_t i = 0; i < landmarks->idx.size(); ++i) {
-    const auto pixel = ImageFromCamera(*camera, image->cam_from_world * landmarks->landmarks[i].position);
-    if (!pixel) continue;
-    target.pixels.push_back(*pixel);
-    rows.push_back(static_cast<Eigen::Index>(i));
-  }
-  target.descriptors.resize(static_cast<Eigen::Index>(rows.size()), kDescriptorDim);
-  for (size_t i = 0; i < rows.size(); ++i) target.descriptors.row(i) = landmarks->descriptors.row(rows[i]);
-  return target;
+  return RobotTarget{std::move(target), PlanarPoseOf(image->cam_from_world)};
 }
 
 Robot::Robot(const Building& building, const Camera& camera, double camera_height_m,
@@ -113,16 +86,14 @@ Camera Robot::AssumedCamera() const {
 }
 
 int Robot::NumAgreeing(const Features& seen, const ServoTarget& target) const {
-  const ServoCommand command =
-      Servo::Create(AssumedCamera(), servo_options_)->Step(MatchPixels(seen, target));
-  return command.epipoles ? command.epipoles->num_inliers : 0;
+  return cairn::NumAgreeing(seen, target, AssumedCamera(), servo_options_);
 }
 
-RobotLeg Robot::GoTo(const ServoTarget& target, bool is_goal) {
-  return options_.servo == "ideal" ? GoIdeally(target) : Steer(target, is_goal);
+RobotLeg Robot::GoTo(const RobotTarget& target, bool is_goal) {
+  return options_.servo == "ideal" ? GoIdeally(target) : Steer(target.target, is_goal);
 }
 
-RobotLeg Robot::GoIdeally(const ServoTarget& target) {
+RobotLeg Robot::GoIdeally(const RobotTarget& target) {
   std::vector<PlanarPose> alike = {target.pose};
   if (building_->layout.twins) {
     const Twins& twins = *building_->layout.twins;
@@ -157,48 +128,63 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
   return leg;
 }
 
+PlanarPose Robot::Mounting() const {
+  return {{servo_options_.camera_ahead_m, servo_options_.camera_left_m},
+          RadFromDeg(servo_options_.camera_turn_deg)};
+}
+
+PlanarPose Robot::Axle() const {
+  PlanarPose axle;
+  axle.heading_rad = WrapAngle(pose_.heading_rad - Mounting().heading_rad);
+  axle.position = pose_.position - Eigen::Rotation2Dd(axle.heading_rad) * Mounting().position;
+  return axle;
+}
+
+void Robot::PutAxleAt(const PlanarPose& axle) {
+  pose_ = {axle.FloorFromRobot(Mounting().position), WrapAngle(axle.heading_rad + Mounting().heading_rad)};
+}
+
 // False where a wall stops it.
 bool Robot::Move(const ServoCommand& command) {
   const double seconds = servo_options_.step_s;
   motion_ =
       SlippedMotion({command.speed_m_s, command.turn_rad_s}, options_.sensors, MixSeed(seed_, num_draws_++));
   const double way = motion_.speed_m_s * seconds;
-  const double heading = pose_.heading_rad + 0.5 * motion_.turn_rad_s * seconds;
-  pose_.heading_rad = WrapAngle(pose_.heading_rad + motion_.turn_rad_s * seconds);
-  if (way == 0) return true;
-  const Eigen::Vector2d moved = pose_.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
-  const double before = ClearanceM(*building_, pose_.position.x(), pose_.position.y());
+  PlanarPose axle = Axle();
+  const double heading = axle.heading_rad + 0.5 * motion_.turn_rad_s * seconds;
+  const Eigen::Vector2d moved = axle.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  const double before = ClearanceM(*building_, axle.position.x(), axle.position.y());
   const double after = ClearanceM(*building_, moved.x(), moved.y());
-  if (after < options_.radius_m && after < before) {
-    motion_ = {};
-    return false;
-  }
-  pose_.position = moved;
-  return true;
+  const bool is_stopped = way != 0 && after < options_.radius_m && after < before;
+  if (!is_stopped) axle.position = moved;
+  axle.heading_rad += motion_.turn_rad_s * seconds;
+  PutAxleAt(axle);
+  if (is_stopped) motion_ = {};
+  return !is_stopped;
 }
 
 // By its wheels alone; then it stands.
 void Robot::TurnOnTheSpot(double turn_rad) {
   const PlanarMotion slipped = SlippedMotion({0, turn_rad}, options_.sensors, MixSeed(seed_, num_draws_++));
-  pose_.heading_rad = WrapAngle(pose_.heading_rad + slipped.turn_rad_s);
+  PlanarPose axle = Axle();
+  axle.heading_rad += slipped.turn_rad_s;
+  PutAxleAt(axle);
   motion_ = {};
 }
 
 RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
-  ServoOptions servo_options = servo_options_;
-  if (!is_goal) {
-    servo_options.arrive_distance_ratio = options_.pass_distance_ratio;
-    servo_options.arrive_heading_deg = options_.pass_heading_deg;
-  }
-  Servo servo = *Servo::Create(AssumedCamera(), servo_options);
+  const Camera camera = AssumedCamera();
+  ImageServo servo =
+      *ImageServo::ToTarget(target, camera,
+                            {.servo = is_goal ? servo_options_ : PassingServo(servo_options_, options_.pass),
+                             .sift = options_.sift});
   RobotLeg leg;
   int num_blocked = 0, num_searched = 0;
   double searched_deg = 0;  // turned since it lost the target, as commanded
   while (static_cast<int>(leg.steps.size()) < options_.max_num_commands) {
-    const std::vector<PixelPair> pairs = MatchPixels(Look(), target);
-    ServoCommand command = servo.Step(pairs);
+    ServoCommand command = *servo.StepFeatures(Look(), camera);
     command.epipoles.reset();
-    leg.steps.push_back({pose_, command, static_cast<int>(pairs.size())});
+    leg.steps.push_back({pose_, command});
     leg.why = command.why;
     leg.arrived = command.state == ServoState::kArrived;
     if (leg.arrived) break;

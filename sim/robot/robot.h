@@ -11,7 +11,7 @@
 #include "core/features/sift.h"
 #include "core/geometry/planar_pose.h"
 #include "core/options/options.h"
-#include "runtime/drive/servo.h"
+#include "runtime/drive/image_servo.h"
 #include "runtime/map/map.h"
 #include "sim/render/building.h"
 #include "sim/render/renderer.h"
@@ -35,31 +35,26 @@ struct RobotOptions {
   double radius_m = 0.15;
   // Most commands to one image.  REQUIRES: >= 1
   int max_num_commands = 120;
-  // Images on the way count as reached at this distance, over that of the scene, and this turn, degrees; the
-  // servo's own limits hold at the goal.  REQUIRES: > 0
-  double pass_distance_ratio = 0.04;
-  double pass_heading_deg = 4;
+  PassOptions pass;
   SensorOptions sensors;
   SiftOptions sift{.max_num_features = 800};
 };
 OptionTable DescribeOptions(RobotOptions* options);
 
-// The features of an image that can be found again, and its place, which only the ideal servo uses.
-struct ServoTarget {
-  std::vector<Eigen::Vector2d> pixels;
-  DescriptorMatrix descriptors;  // row i: pixel i
+// Where the robot goes: what it sees there, and the place, which only the ideal servo uses.
+struct RobotTarget {
+  ServoTarget target;
   PlanarPose pose;
 };
 
-// The target of a survey image: the map's landmarks that it sees, projected by its pose.  Errors: as Map's.
-Result<ServoTarget> TargetOfImage(const Map& map, int32_t image);
+// Where a survey image was taken.  Errors: as cairn::TargetOfImage.
+Result<RobotTarget> RobotTargetOf(const Map& map, int32_t image);
 // The place of a survey image on the floor of the capture's frame.
 PlanarPose PlanarPoseOf(const Pose& cam_from_world);
 
 struct RobotStep {
   PlanarPose pose;       // before the command
   ServoCommand command;  // epipoles left out
-  int num_matches = 0;
 };
 
 struct RobotLeg {
@@ -69,7 +64,8 @@ struct RobotLeg {
   std::vector<RobotStep> steps;
 };
 
-// A robot with a camera in a synthetic building.  Deterministic by its seed.
+// A robot with a camera in a synthetic building; its pose is the camera's, which is where the servo's options
+// say.  Deterministic by its seed.
 class Robot {
  public:
   // `building` must outlive it.  Errors: InvalidArgument (options; an invalid camera).
@@ -90,14 +86,18 @@ class Robot {
   int NumAgreeing(const Features& seen, const ServoTarget& target) const;
   // Goes to where an image was taken.  If there are no matches with the target, it searches by turning on
   // the spot.
-  RobotLeg GoTo(const ServoTarget& target, bool is_goal);
+  RobotLeg GoTo(const RobotTarget& target, bool is_goal);
 
  private:
   Robot(const Building& building, const Camera& camera, double camera_height_m, const RobotOptions& options,
         const ServoOptions& servo_options, uint64_t seed);
-  RobotLeg GoIdeally(const ServoTarget& target);
+  RobotLeg GoIdeally(const RobotTarget& target);
   RobotLeg Steer(const ServoTarget& target, bool is_goal);
   Camera AssumedCamera() const;
+  // The middle of the axle, about which it turns, and the camera's place on the robot.
+  PlanarPose Axle() const;
+  void PutAxleAt(const PlanarPose& axle);
+  PlanarPose Mounting() const;
   bool Move(const ServoCommand& command);
   void TurnOnTheSpot(double turn_rad);
 

@@ -11,12 +11,6 @@
 namespace cairn::sim {
 namespace {
 
-ServoTarget TargetOfFeatures(const Features& features, const PlanarPose& pose) {
-  ServoTarget target{{}, features.descriptors, pose};
-  for (const Keypoint& keypoint : features.keypoints) target.pixels.emplace_back(keypoint.x, keypoint.y);
-  return target;
-}
-
 class Driver {
  public:
   Driver(const Map& map, const PlaceModel& model, Robot robot, int32_t goal_image,
@@ -29,7 +23,7 @@ class Driver {
 
   // Errors are those of the map's file; what happens to the robot is part of the drive.
   Result<RobotDrive> Run() {
-    CAIRN_ASSIGN_OR_RETURN(const ServoTarget goal, TargetOfImage(map_, drive_.goal_image));
+    CAIRN_ASSIGN_OR_RETURN(const RobotTarget goal, RobotTargetOf(map_, drive_.goal_image));
     drive_.goal = goal.pose;
     if (Status status = LookAnew("start"); !status.ok()) {
       drive_.error = status.error();
@@ -45,7 +39,7 @@ class Driver {
   }
 
  private:
-  Status FollowWays(const ServoTarget& goal) {
+  Status FollowWays(const RobotTarget& goal) {
     while (num_legs_ < options_.max_num_legs) {
       if (way_.LeadsToGoal()) {
         DriveLeg& leg = Go("go", goal, goal_node_, true);
@@ -54,7 +48,7 @@ class Driver {
         continue;
       }
       const NodeIdx node = way_.nodes()[way_.next()];
-      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, TargetOfNode(node));
+      CAIRN_ASSIGN_OR_RETURN(const RobotTarget target, TargetOfNode(node));
       DriveLeg& leg = Go("go", target, node, false);
       if (!leg.arrived) {
         CAIRN_RETURN_IF_ERROR(GiveUp(&leg));
@@ -62,7 +56,7 @@ class Driver {
       }
       way_.Arrive();
       const Features seen = robot_.Look();
-      trail_.push_back(TargetOfFeatures(seen, robot_.pose()));
+      trail_.push_back({TargetOfFeatures(seen), robot_.pose()});
       const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(seen.descriptors));
       leg.verdict = VerdictName(verdict);
       Note(&leg);
@@ -90,7 +84,7 @@ class Driver {
     CAIRN_RETURN_IF_ERROR(KeepSeen(seen, &scores));
     CAIRN_ASSIGN_OR_RETURN(hypotheses_,
                            StartHypotheses::Make(model_, scores, goal_node_, options_.hypotheses));
-    trail_ = {TargetOfFeatures(seen, robot_.pose())};
+    trail_ = {{TargetOfFeatures(seen), robot_.pose()}};
     Note(&drive_.legs.back());
     return TakeWay(hypotheses_->hypotheses()[hypotheses_->followed()].path, seen);
   }
@@ -105,8 +99,8 @@ class Driver {
     std::vector<double> kept(scores->scores.size(), 0);
     double most = 0;
     for (const NodeIdx node : order) {
-      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, TargetOfNode(node));
-      const int num_agreeing = robot_.NumAgreeing(seen, target);
+      CAIRN_ASSIGN_OR_RETURN(const RobotTarget target, TargetOfNode(node));
+      const int num_agreeing = robot_.NumAgreeing(seen, target.target);
       if (num_agreeing < options_.min_start_inliers) continue;
       kept[node] = num_agreeing;
       most = std::max(most, kept[node]);
@@ -120,14 +114,14 @@ class Driver {
   // Whether the robot sees what the image at `index` of the way shows; past the last index: the goal's image.
   Result<bool> SeesNode(const Features& seen, size_t index) const {
     if (options_.min_start_inliers == 0) return false;
-    CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, index < way_.nodes().size()
+    CAIRN_ASSIGN_OR_RETURN(const RobotTarget target, index < way_.nodes().size()
                                                          ? TargetOfNode(way_.nodes()[index])
-                                                         : TargetOfImage(map_, drive_.goal_image));
-    return robot_.NumAgreeing(seen, target) >= options_.min_start_inliers;
+                                                         : RobotTargetOf(map_, drive_.goal_image));
+    return robot_.NumAgreeing(seen, target.target) >= options_.min_start_inliers;
   }
 
-  Result<ServoTarget> TargetOfNode(NodeIdx node) const {
-    return TargetOfImage(map_, model_.appearance().node_images[node].front());
+  Result<RobotTarget> TargetOfNode(NodeIdx node) const {
+    return RobotTargetOf(map_, model_.appearance().node_images[node].front());
   }
 
   Status Relocalize(const std::string& why) {
@@ -200,7 +194,7 @@ class Driver {
     return Ok();
   }
 
-  DriveLeg& Go(const char* kind, const ServoTarget& target, NodeIdx node, bool is_goal) {
+  DriveLeg& Go(const char* kind, const RobotTarget& target, NodeIdx node, bool is_goal) {
     if (kidnapping_ && kidnapping_->before_leg == num_legs_) robot_.PutAt(kidnapping_->pose);
     ++num_legs_;
     const PlanarPose before = robot_.pose();
@@ -238,7 +232,7 @@ class Driver {
   NodeIdx goal_node_ = -1;
   RobotDrive drive_;
   std::optional<StartHypotheses> hypotheses_;
-  std::vector<ServoTarget> trail_;  // its own images since the start, beginning with that one
+  std::vector<RobotTarget> trail_;  // its own images since the start, beginning with that one
   DriveWay way_;                    // without the goal, unless it is the start
   NodeIdx unreached_ = -1;          // seen last but not reached
   int num_legs_ = 0;

@@ -24,8 +24,7 @@ struct RobotDriveOptions {
   // Number of places that are checked in this way, those that score best.  REQUIRES: >= 1
   int max_num_start_checks = 40;
   RobotOptions robot;
-  // On its way a robot is less exact than a servo is by default: it should not spend long on any image.
-  ServoOptions servo{.patience_commands = 40};
+  ServoOptions servo{.patience_commands = kDrivePatienceCommands};
   StartHypothesesOptions hypotheses;
 };
 OptionTable DescribeOptions(RobotDriveOptions* options);

@@ -1,5 +1,6 @@
 // Writes the poster's map and two pictures, of it and of nothing, and the map, pictures (0.pgm, 1.pgm, ...)
-// and odometry of a drive, and the map and pictures (wing0.pgm, ...) of two wings that look alike:
+// and odometry of a drive, and the map and pictures (wing0.pgm, ...) of two wings that look alike,
+// and those (room0.pgm, ...) of a room through which a robot is steered:
 // make_poster_map FOLDER
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +10,7 @@
 
 #include "core/blocks/map_rows.h"
 #include "tests/install/poster_drive.h"
+#include "tests/install/poster_room.h"
 #include "tests/install/poster_wings.h"
 
 namespace {
@@ -33,6 +35,17 @@ bool WriteWings(const std::string& folder) {
   return cairn::WriteMapRows(wings.rows(), folder + "/wings.cairn").ok();
 }
 
+// Pictures from every 5 cm of the way: room0.pgm at r0, room8.pgm at r1, ...
+bool WriteRoom(const std::string& folder) {
+  const cairn::PosterRoom room;
+  for (int i = 0; i <= 24; ++i) {
+    if (!cv::imwrite(folder + "/room" + std::to_string(i) + ".pgm",
+                     room.PictureAt(cairn::PosterRoom::kFirstM + 0.05 * i)))
+      return false;
+  }
+  return cairn::WriteMapRows(room.rows(), folder + "/room.cairn").ok();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -45,6 +58,7 @@ int main(int argc, char** argv) {
     return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 1;
   const cv::Mat blank(scene.camera.height, scene.camera.width, CV_8UC1, cv::Scalar(90));
   const bool written = cv::imwrite(folder + "/poster.pgm", RenderPoster(scene, PosterQueryPose())) &&
-                       cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder) && WriteWings(folder);
+                       cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder) &&
+                       WriteWings(folder) && WriteRoom(folder);
   return written ? 0 : 1;
 }

@@ -480,6 +480,69 @@ class Localizing(Poster):
         self.assertEqual(set(codes), {0, 9})  # fixes, and busy
 
 
+class Steering(unittest.TestCase):
+    """On the way to r2 of tests/install/poster_room.h; tests/install/check_steering.sh compares commands with C's and C++'s."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.map = cairn.Map.open(POSTER / "room.cairn")
+        cls.target = cls.map.find_image("r2")
+        *cls.pictures, cls.there = [read_pgm(POSTER / f"room{i}.pgm") for i in (0, 4, 8, 10, 16)]
+
+    def test_comes_nearer_and_arrives(self):
+        servo = cairn.Servo(self.map, self.target)
+        self.assertEqual(servo.step_s, 0.25)
+        for picture in self.pictures:
+            command = servo.step(picture)
+            self.assertEqual(command.state, "approaching")
+            self.assertGreater(command.speed_m_s, 0)
+            self.assertGreaterEqual(command.num_matches, command.num_inliers)
+            self.assertGreater(command.num_inliers, 12)
+        self.assertIn("comes in", command.why)
+        lost = servo.step(numpy.full_like(self.there, 90))
+        self.assertEqual((lost.state, lost.speed_m_s, lost.turn_rad_s, lost.num_inliers), ("lost", 0, 0, 0))
+        there = servo.step(self.there)
+        self.assertEqual((there.state, there.speed_m_s), ("arrived", 0))
+
+    def test_goes_the_other_way_where_something_stands_in_it(self):
+        servo = cairn.Servo(self.map, self.target)
+        servo.blocked()  # nothing was commanded
+        self.assertGreater(servo.step(self.pictures[0]).speed_m_s, 0)
+        servo.blocked()
+        self.assertIn("retreats", servo.step(self.pictures[0]).why)
+
+    def test_options_reach_the_servo(self):
+        slow = cairn.Servo(self.map, self.target, max_speed_m_s=0.1, step_s=0.5, max_num_features=50)
+        command = slow.step(self.pictures[0])
+        self.assertLessEqual(command.speed_m_s, 0.1)
+        self.assertLessEqual(command.num_matches, 50)
+        self.assertEqual(slow.step_s, 0.5)
+        self.assertEqual(cairn.Servo(self.map, self.target, min_num_inliers=1000).step(self.pictures[0]).state, "lost")
+
+    def test_what_cannot_be_is_refused_and_changes_nothing(self):
+        servo, expected = cairn.Servo(self.map, self.target), cairn.Servo(self.map, self.target)
+        for name, wrong in (("invalid_argument", lambda: cairn.Servo(self.map, 4)),
+                            ("invalid_argument", lambda: cairn.Servo(self.map, -1)),
+                            ("invalid_argument", lambda: cairn.Servo(self.map, 0, max_speed_m_s=float("nan"))),
+                            ("invalid_argument", lambda: cairn.Servo(self.map, 0, score_exponent=1)),
+                            ("not_found", lambda: servo.step(self.there[:100])),
+                            ("invalid_argument", lambda: servo.step(self.there, cairn.Camera("SIMPLE_PINHOLE", 32, 24, [28, 16, 12])))):
+            with self.assertRaises(cairn.Error) as caught:
+                wrong()
+            self.assertEqual(caught.exception.name, name)
+        for error, wrong in ((TypeError, lambda: servo.step(self.there.astype(float))), (TypeError, lambda: servo.step([[1]])),
+                             (TypeError, lambda: cairn.Servo(self.map)), (ValueError, lambda: servo.step(self.there[0])),
+                             (TypeError, lambda: cairn.Servo.__new__(cairn.Servo).step(self.there)),
+                             (TypeError, lambda: cairn.ServoCommand.__new__(cairn.ServoCommand).why)):
+            with self.assertRaises(error):
+                wrong()
+        for picture in self.pictures[:2]:
+            found, wanted = servo.step(picture), expected.step(picture)
+            self.assertEqual((found.speed_m_s, found.turn_rad_s), (wanted.speed_m_s, wanted.turn_rad_s))
+        with self.assertRaisesRegex(cairn.Error, "another camera than before"):
+            servo.step(self.there, cairn.Camera("SIMPLE_PINHOLE", 320, 240, [300, 160, 120]))
+
+
 class Following(unittest.TestCase):
     """The drive of make_poster_map: five frames ahead, then carried away, where it stands."""
 

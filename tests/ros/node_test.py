@@ -49,7 +49,8 @@ os.environ.update(ROS_MASTER_URI=f"http://localhost:{PORT}", ROS_HOSTNAME="local
 import rosgraph  # noqa: E402
 import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped  # noqa: E402
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Twist  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
 from sensor_msgs.msg import Image, PointCloud  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
@@ -180,13 +181,13 @@ class Node(unittest.TestCase):
     @unittest.skipUnless(IS_POSTER, "of the poster's wings")
     def test_finds_out_where_it_started(self):
         """tests/install/poster_wings.h: a robot drives along wing b; places are 10 m apart in y, a0 at 0, b0 at 40.3."""
-        topics = ("image", "goal", "progress", "starts", "way", "verdict", "pose")
+        topics = ("image", "goal", "progress", "starts", "way", "verdict", "pose", "next", "cmd_vel")
         node = self.start("__name:=starter", f"_map:={POSTER / 'wings.cairn'}", *[f"{topic}:=wing_{topic}" for topic in topics])
         self.addCleanup(node.wait)
         self.addCleanup(node.terminate)
         said = {}
         subscribers = [rospy.Subscriber(f"wing_{topic}", kind, lambda message, topic=topic: said.setdefault(topic, []).append(message))
-                       for topic, kind in (("starts", PointCloud), ("way", PoseArray), ("verdict", String))]
+                       for topic, kind in (("starts", PointCloud), ("way", PoseArray), ("verdict", String), ("next", String))]
         publishers = {topic: rospy.Publisher(f"wing_{topic}", kind, queue_size=1)
                       for topic, kind in (("image", Image), ("goal", String), ("progress", String))}
 
@@ -201,7 +202,7 @@ class Node(unittest.TestCase):
             """What starts, way and verdict are after a message."""
             said.clear()
             publishers[topic].publish(message)
-            wait(lambda: len(said) == 3)
+            wait(lambda: len(said) == 4)
             starts, way = said["starts"][-1], said["way"][-1]
             channels = {channel.name: channel.values for channel in starts.channels}
             posterior = {round(point.y): value for point, value in zip(starts.points, channels["posterior"])}
@@ -223,25 +224,199 @@ class Node(unittest.TestCase):
         time.sleep(0.5)
         self.assertEqual(said, {})  # it has not arrived anywhere
         ask("progress", "arrived")
+        self.assertEqual(said["next"][-1].data, "a1")
         posterior, followed, _, verdict = look(1)
+        self.assertEqual(said["next"][-1].data, "a2")
         self.assertEqual((followed, verdict), ([0], "follow"))
         self.assertAlmostEqual(sum(posterior.values()), 1, 5)
         ask("progress", "arrived")
         posterior, followed, way, verdict = look(2)
         self.assertEqual((followed, way, verdict), ([40], [40, 50, 60, 70, 80, 90], "switch"))
         self.assertGreater(posterior[40], 0.9)
+        self.assertEqual(said["next"][-1].data, "")  # back to its start
         self.assertEqual(ask("progress", "restarted")[1], [40])
+        self.assertEqual(said["next"][-1].data, "b1")
+        self.assertNotIn("/wing_cmd_vel", [topic for topic, _ in rospy.get_published_topics()])  # nobody asked for it
         self.assertEqual(ask("progress", "refuted")[3], "switch")
         self.assertEqual(ask("progress", "refuted")[3], "lost")
         self.assertIn("expected 'arrived'", ask("progress", "tired")[3])
 
+    class Robot:
+        """A node of the room of tests/install/poster_room.h, or of another map, with topics of its own, and what it says."""
+
+        def __init__(self, test, name, *arguments, map="room"):
+            topics = ("image", "goal", "odom", "cmd_vel", "next", "verdict", "places", "pose", "starts", "way", "progress")
+            self.node = test.start(f"__name:={name}", f"_map:={POSTER / map}.cairn", "_diagnostics_period_s:=0",
+                                   f"/diagnostics:={name}_diagnostics", *[f"{topic}:={name}_{topic}" for topic in topics], *arguments)
+            test.addCleanup(self.node.wait)
+            test.addCleanup(self.node.terminate)
+            self.test, self.said, self.stamp = test, {}, rospy.Time.from_sec(time.time())
+            self.publishers = {topic: rospy.Publisher(f"{name}_{topic}", kind, queue_size=10)
+                               for topic, kind in (("image", Image), ("goal", String), ("odom", Odometry), ("progress", String))}
+            # A robot that is not steered has no cmd_vel to listen to, one without ~where no places.
+            self.subscribers = [rospy.Subscriber(f"{name}_{topic}", kind, lambda m, topic=topic: self.said.setdefault(topic, []).append(m))
+                                for topic, kind in (("cmd_vel", Twist), ("next", String), ("verdict", String), ("places", PointCloud),
+                                                    ("diagnostics", DiagnosticArray))]
+            self.wait(lambda: self.publishers["image"].get_num_connections() > 0)
+            self.wait(lambda: all(each.get_num_connections() > 0 for each in self.subscribers[1:3]))
+            time.sleep(0.5)
+
+        def wait(self, condition):
+            for _ in range(500):
+                if condition():
+                    return
+                time.sleep(0.02)
+            self.test.fail(f"no answer: {list(self.said)}")
+
+        def show(self, pixels, after_s=0.25):
+            """The diagnostics of an image that was taken so long after the one before."""
+            self.stamp = max(self.stamp + rospy.Duration(after_s), rospy.Time.from_sec(time.time()) if after_s == 0 else self.stamp)
+            self.said["diagnostics"] = []
+            self.publishers["image"].publish(image_message(pixels, "mono8", self.stamp))
+            self.wait(lambda: self.said["diagnostics"])
+            time.sleep(0.05)
+            return {pair.key: pair.value for pair in self.said["diagnostics"][-1].status[0].values}
+
+        def last_command(self):
+            return self.said["cmd_vel"][-1].linear.x, self.said["cmd_vel"][-1].angular.z
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_is_steered_from_image_to_image_to_its_goal(self):
+        """Pictures are 5 cm apart; r1 is at 40 cm, r2 at 80, r3 at 120."""
+        robot = self.Robot(self, "steered", "_steer:=true", "_max_speed_m_s:=0.3")
+        pictures = [read_pgm(POSTER / f"room{i}.pgm") for i in range(25)]
+        robot.show(pictures[0])
+        self.assertNotIn("cmd_vel", robot.said)  # without a goal
+        robot.publishers["goal"].publish("r3")
+        robot.wait(lambda: robot.said.get("verdict"))
+        robot.stamp = rospy.Time.from_sec(time.time() + 0.1)
+        ahead_m, nexts = 0, []
+        for number in range(150):
+            status = robot.show(pictures[min(24, max(0, round(ahead_m / 0.05)))])
+            if robot.said["verdict"][-1].data == "goal":
+                break
+            nexts += [status["next"]] if [status["next"]] != nexts[-1:] else []
+            speed, _ = robot.last_command()
+            self.assertLessEqual(abs(speed), 0.3)
+            ahead_m += speed * 0.25
+            if number == 2:  # the camera is silent while the robot drives
+                self.assertGreater(speed, 0.05)
+                num_commands = len(robot.said["cmd_vel"])
+                time.sleep(0.5)
+                self.assertEqual(len(robot.said["cmd_vel"]), num_commands)
+                time.sleep(1)
+                self.assertEqual(len(robot.said["cmd_vel"]), num_commands + 1)
+                self.assertEqual(robot.last_command(), (0, 0))
+        self.assertEqual(robot.said["verdict"][-1].data, "goal", status)
+        self.assertEqual(nexts, ["r1", "r2", "r3"])
+        self.assertEqual(robot.said["next"][-1].data, "")
+        self.assertAlmostEqual(ahead_m, 1.2, delta=0.06)
+        self.assertEqual(robot.last_command(), (0, 0))
+        num_commands = len(robot.said["cmd_vel"])
+        self.assertEqual(robot.show(pictures[0])["steering"], "off")
+        self.assertEqual(len(robot.said["cmd_vel"]), num_commands)  # it is there
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_stands_where_it_cannot_see_the_next_image(self):
+        robot = self.Robot(self, "dazzled", "_steer:=true")
+        picture = read_pgm(POSTER / "room0.pgm")
+        robot.publishers["goal"].publish("r3")
+        robot.wait(lambda: robot.said.get("verdict"))
+        robot.stamp = rospy.Time.from_sec(time.time() + 0.1)
+        robot.show(picture)
+        self.assertGreater(robot.last_command()[0], 0)
+        status = robot.show(numpy.full_like(picture, 90))
+        self.assertEqual((robot.last_command(), status["steering"]), ((0, 0), "lost"))
+        robot.show(picture)
+        self.assertGreater(robot.last_command()[0], 0)
+        status = robot.show(picture[:100])  # of no camera of the map
+        self.assertEqual((robot.last_command(), status["steering"]), ((0, 0), "error"))
+        self.assertIn("320 x 100", status["steering_why"])
+        robot.show(picture)
+        self.assertGreater(robot.last_command()[0], 0)
+        num_commands = len(robot.said["cmd_vel"])
+        robot.show(picture, 0.1)  # too soon for a command
+        self.assertEqual(len(robot.said["cmd_vel"]), num_commands)
+        robot.publishers["goal"].publish("r9")
+        robot.wait(lambda: "r9" in robot.said["verdict"][-1].data)
+        self.assertEqual(robot.last_command(), (0, 0))
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's wings")
+    def test_goes_on_from_where_it_is_when_another_start_leads(self):
+        """Places of both wings look alike: in wing b, the way of wing a is followed first."""
+        robot = self.Robot(self, "doubted", "_steer:=true", map="wings")
+        robot.publishers["goal"].publish("h1")
+        robot.wait(lambda: robot.said.get("verdict"))
+        robot.stamp = rospy.Time.from_sec(time.time() + 0.1)
+        robot.show(read_pgm(POSTER / "wing0.pgm"))
+        self.assertIn(robot.said["next"][-1].data, ("a0", "a1"))
+        robot.publishers["progress"].publish("refuted")
+        robot.wait(lambda: robot.said["verdict"][-1].data == "switch")
+        robot.wait(lambda: robot.said["next"][-1].data == "b1")
+        robot.publishers["progress"].publish("refuted")
+        robot.wait(lambda: robot.said["verdict"][-1].data == "lost")
+        self.assertEqual(robot.said["next"][-1].data, "")
+        self.assertEqual(robot.show(read_pgm(POSTER / "wing0.pgm"))["steering"], "off")
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_says_where_it_may_be_by_images_and_odometry(self):
+        robot = self.Robot(self, "lost", "_where:=true", "_where_period_s:=1")
+
+        def where():
+            """The places and P(elsewhere), which sum to 1."""
+            status = robot.said["diagnostics"][-1].status[0]
+            values = {pair.key: pair.value for pair in status.values}
+            places = robot.said["places"][-1]
+            self.assertEqual(places.header.frame_id, "map")
+            self.assertEqual(places.channels[0].name, "probability")
+            probabilities = places.channels[0].values
+            self.assertEqual(len(probabilities), len(places.points))
+            self.assertAlmostEqual(sum(probabilities) + float(values["elsewhere"]), 1, 5)
+            self.assertAlmostEqual(float(values["place_probability"]), max(probabilities), 5)
+            return values["place"], max(probabilities), places.points[numpy.argmax(probabilities)].x
+
+        def drive(x, y, heading):
+            message = Odometry()
+            message.header.stamp = robot.stamp + rospy.Duration(0.5)
+            message.pose.pose.position.x, message.pose.pose.position.y = x, y
+            message.pose.pose.orientation.z, message.pose.pose.orientation.w = numpy.sin(heading / 2), numpy.cos(heading / 2)
+            robot.publishers["odom"].publish(message)
+            time.sleep(0.1)
+
+        picture = read_pgm(POSTER / "room0.pgm")
+        drive(5, 5, numpy.pi / 2)
+        robot.show(picture, 1)
+        name, probability, x = where()
+        self.assertEqual(name, "r0")
+        self.assertGreater(probability, 0.5)
+        self.assertAlmostEqual(x, -4, 3)
+        self.assertNotIn("cmd_vel", robot.said)
+        num_answers = len(robot.said["places"])
+        robot.show(picture, 0.3)  # before the period is over
+        self.assertEqual(len(robot.said["places"]), num_answers)
+        robot.show(picture, 1)
+        self.assertEqual(where()[0], "r0")
+        drive(5, 6.2, numpy.pi / 2)  # 120 cm ahead, in the frame of odometry along y
+        robot.show(numpy.full_like(picture, 90), 1)
+        name, probability, _ = where()
+        self.assertEqual(name, "r3")
+        self.assertGreater(probability, 0.5)
+
     def test_bad_parameters_end_the_node_with_a_sentence(self):
-        for arguments, words, code in ((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
+        for number, (arguments, words, code) in enumerate(((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),
                                        ((f"_map:={MAP}", "_memory_budget_mib:=-5"), "memory_budget_mib is -5", 2),
                                        ((f"_map:={MAP}", "_memory_budget_mib:=many"), "memory_budget_mib is of the wrong", 2),
-                                       ((f"_map:={MAP}", "_camera_in_robot:=[0, zero]"), "camera_in_robot is of the", 2)):
-            node = self.start(f"__name:=bad{code}{len(words)}", *arguments)  # the master keeps parameters by name
+                                       ((f"_map:={MAP}", "_camera_in_robot:=[0, zero]"), "camera_in_robot is of the", 2),
+                                       ((f"_map:={MAP}", "_steer:=true", "_step_s:=0"), "step_s = 0", 2),
+                                       ((f"_map:={MAP}", "_steer:=true", "_max_speed_m_s:=-1"), "max_speed_m_s = -1", 2),
+                                       ((f"_map:={MAP}", "_steer:=true", "_stop_after_s:=0"), "stop_after_s is 0", 2),
+                                       # Looks to the left.
+                                       ((f"_map:={MAP}", "_steer:=true", "_camera_in_robot:=[0, 0, 1, -0.7071068, 0, 0, 0.7071068]"),
+                                        "camera_turn_deg = 90", 2),
+                                       ((f"_map:={MAP}", "_where:=true", "_where_period_s:=-1"), "where_period_s is -1", 2),
+                                       ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2))):
+            node = self.start(f"__name:=bad{number}", *arguments)  # the master keeps parameters by name
             try:
                 output, _ = node.communicate(timeout=20)
             finally:

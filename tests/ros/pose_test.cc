@@ -1,4 +1,7 @@
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -6,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "ros/grey_pixels.h"
+#include "ros/odometry.h"
 #include "ros/robot_pose.h"
 
 namespace cairn {
@@ -100,6 +104,70 @@ TEST(RobotPose, CovarianceIsThatOfPerturbedPosesWithAMountedCamera) {
   EXPECT_LT(found.orientation.angularDistance(robot.rotation), 1e-7);
   const Matrix6d expected = jacobian * fix.covariance * jacobian.transpose();
   EXPECT_LT((found.covariance - expected).norm(), 1e-4);
+}
+
+// x right, y down, z forward, turned to the left about the robot's z.
+Pose CameraMountedAt(double ahead_m, double left_m, double turn_left_rad) {
+  Eigen::Matrix3d axes;
+  axes << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(turn_left_rad, Eigen::Vector3d::UnitZ()) *
+                             Eigen::Quaterniond(axes)),
+          {ahead_m, left_m, 0.8}};
+}
+
+TEST(CameraOnFloor, LooksAlongItsOpticalAxis) {
+  const PlanarPose pose = CameraOnFloor(CameraMountedAt(0.3, -0.1, 0.4));
+  EXPECT_NEAR(pose.position.x(), 0.3, 1e-12);
+  EXPECT_NEAR(pose.position.y(), -0.1, 1e-12);
+  EXPECT_NEAR(pose.heading_rad, 0.4, 1e-12);
+  EXPECT_EQ(CameraOnFloor(Pose()).heading_rad, 0);  // without a mounting
+}
+
+//  odometry:  y ^    2      1: at (2, 1), looks along y    2: at (2, 3), looks along -x
+//               |
+//               |    1      The camera is 0.5 m ahead of the robot and looks to its left.
+//               +------> x
+TEST(Odometry, SaysHowTheMountedCameraMoved) {
+  Odometry odometry(CameraMountedAt(0.5, 0, std::numbers::pi / 2));
+  ASSERT_TRUE(odometry.Add(1, {{2, 1}, std::numbers::pi / 2}).ok());
+  EXPECT_FALSE(odometry.MoveTo(1));  // the first image
+  ASSERT_TRUE(odometry.Add(2, {{2, 3}, std::numbers::pi}).ok());
+  const std::optional<CameraMove> move = odometry.MoveTo(2);
+  ASSERT_TRUE(move);
+  // From (2, 1.5), looking along -x, to (1.5, 3).
+  EXPECT_NEAR(move->way_m.x(), 0.5, 1e-12);
+  EXPECT_NEAR(move->way_m.y(), -1.5, 1e-12);
+  EXPECT_NEAR(move->turn_left_rad, std::numbers::pi / 2, 1e-12);
+  EXPECT_NEAR(odometry.MoveTo(2)->way_m.norm(), 0, 1e-12);  // it stands
+}
+
+TEST(Odometry, TakesTheImagesTimeBetweenTwoPoses) {
+  Odometry odometry{Pose()};
+  ASSERT_TRUE(odometry.Add(1, {{0, 0}, 3}).ok());
+  ASSERT_TRUE(odometry.Add(3, {{4, 0}, -3}).ok());  // on by 0.28 rad, past pi
+  EXPECT_FALSE(odometry.MoveTo(0.5));               // before odometry began
+  EXPECT_FALSE(odometry.MoveTo(1));
+  const std::optional<CameraMove> move = odometry.MoveTo(1.5);
+  ASSERT_TRUE(move);
+  EXPECT_NEAR(move->way_m.norm(), 1, 1e-12);
+  EXPECT_NEAR(move->turn_left_rad, 0.25 * (2 * std::numbers::pi - 6), 1e-12);
+  EXPECT_NEAR(odometry.MoveTo(9)->way_m.norm(), 3, 1e-12);  // after the last one: there
+  EXPECT_NEAR(odometry.MoveTo(0)->way_m.norm(), 0, 1e-12);  // now
+}
+
+TEST(Odometry, BeginsAnewWhereTimeGoesBackAndRefusesWhatIsNotFinite) {
+  Odometry odometry{Pose()};
+  ASSERT_TRUE(odometry.Add(5, {{1, 0}, 0}).ok());
+  EXPECT_FALSE(odometry.MoveTo(5));
+  ASSERT_TRUE(odometry.Add(5, {{2, 0}, 0}).ok());  // of the same time: the later one counts
+  EXPECT_NEAR(odometry.MoveTo(5)->way_m.x(), 1, 1e-12);
+  ASSERT_TRUE(odometry.Add(1, {{7, 0}, 0}).ok());
+  EXPECT_FALSE(odometry.MoveTo(1));  // it did not drive from one recording to the other
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(odometry.Add(2, {{nan, 0}, 0}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_FALSE(odometry.Add(2, {{0, 0}, nan}).ok());
+  EXPECT_FALSE(odometry.Add(nan, {{0, 0}, 0}).ok());
+  EXPECT_NEAR(odometry.MoveTo(2)->way_m.x(), 0, 1e-12);
 }
 
 }  // namespace

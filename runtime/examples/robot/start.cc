@@ -4,18 +4,12 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "core/features/sift.h"
 #include "pgm.h"
 #include "runtime/drive/start_hypotheses.h"
 #include "runtime/map/map.h"
-
-template <typename T>
-T ValueOrExit(cairn::Result<T> result) {
-  if (!result.ok()) std::fprintf(stderr, "%s\n", result.error().message.c_str()), std::exit(1);
-  return std::move(result).value();
-}
+#include "value_or_exit.h"
 
 // What a picture says about where it was taken.
 cairn::PlaceScores Look(const cairn::PlaceModel& model, const char* path) {

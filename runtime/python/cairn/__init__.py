@@ -11,6 +11,8 @@ or without a goal: PlaceBelief.
 
 A robot that may be in any of many maps asks an Atlas of them: AtlasLocalizer.
 
+A way over survey images is Map.route; a Servo steers a robot from one to the next by its camera.
+
 Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
@@ -32,6 +34,8 @@ from ._cairn import (
     PlaceScores,
     Prior,
     Route,
+    Servo,
+    ServoCommand,
     StartHypotheses,
     StartHypothesis,
     Tracker,
@@ -58,6 +62,8 @@ __all__ = [
     "PlaceScores",
     "Prior",
     "Route",
+    "Servo",
+    "ServoCommand",
     "StartHypotheses",
     "StartHypothesis",
     "Tracker",

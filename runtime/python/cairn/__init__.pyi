@@ -208,6 +208,53 @@ class PlaceBelief:
         """P(at no place of the map)"""
 
 @final
+class ServoCommand:
+    """How a robot is to drive until the next image."""
+
+    @property
+    def speed_m_s(self) -> float:
+        """Ahead; negative: backwards"""
+    @property
+    def turn_rad_s(self) -> float:
+        """To the left"""
+    @property
+    def state(self) -> Literal["turning", "approaching", "arrived", "lost"]:
+        """"lost": the target is not in sight, and the robot stands"""
+    @property
+    def num_matches(self) -> int:
+        """With what the target shows"""
+    @property
+    def num_inliers(self) -> int:
+        """Of these, that agree on one motion"""
+    @property
+    def why(self) -> str: ...
+
+@final
+class Servo:
+    """Steers a robot with wheels to where a survey image was taken, by its camera alone, which looks ahead.
+
+    One for each image of a way: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, map: Map, image: int, **options: bool | int | float | str) -> None:
+        """`options`: of where the camera is on the robot (camera_ahead_m and camera_left_m of the middle of its axle,
+        camera_turn_deg; without: above it, and it looks ahead), of driving (max_speed_m_s=0.3, step_s=0.1), of arriving
+        (for an image on the way arrive_distance_ratio=0.04 and arrive_heading_deg=4 will do), of motions (min_num_inliers=12) and of features (max_num_features=800).
+
+        Raises Error: invalid_argument (no such image), no_data (it shows no landmarks).
+        """
+    def step(self, image: NDArray[np.uint8], camera: Camera | None = None) -> ServoCommand:
+        """The command after an image, which should come every step_s; as Localizer.localize, and the same camera for all images.
+
+        After an Error the servo is as before; the robot had better stand.
+        """
+    def blocked(self) -> None:
+        """The last command did not move the robot, since something stands in the way: it goes the other way."""
+    @property
+    def step_s(self) -> float:
+        """How long a command holds, seconds: a robot without another one by then stops."""
+
+@final
 class Atlas:
     """Many maps of a site as one (`cairn atlas`): immutable, shared by all threads.  Maps' files are opened when they are needed."""
 

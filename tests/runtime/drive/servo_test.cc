@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <tuple>
 
 #include "core/geometry/pose.h"
 #include "tests/runtime/drive/servo_scene.h"
@@ -23,11 +24,17 @@ struct Drive {
   int num_blocked = 0;
 };
 
+PlanarPose Composed(const PlanarPose& a, const PlanarPose& b) {
+  return {a.FloorFromRobot(b.position), WrapAngle(a.heading_rad + b.heading_rad)};
+}
+PlanarPose Inverse(const PlanarPose& pose) { return {pose.RobotFromFloor({0, 0}), -pose.heading_rad}; }
+
 // Something stands behind this x of the floor frame.
 constexpr double kNoWall = -std::numeric_limits<double>::infinity();
 
 Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose& target,
-              const ServoOptions& options = {}, double focal_factor = 1, double wall_x_m = kNoWall) {
+              const ServoOptions& options = {}, double focal_factor = 1, double wall_x_m = kNoWall,
+              const PlanarPose& mounting = {}) {
   Camera assumed = scene.camera;
   assumed.params[0] *= focal_factor;
   Servo servo = *Servo::Create(assumed, options);
@@ -39,7 +46,9 @@ Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose
     drive.greatest_speed_m_s = std::max(drive.greatest_speed_m_s, std::abs(drive.last.speed_m_s));
     drive.greatest_turn_rad_s = std::max(drive.greatest_turn_rad_s, std::abs(drive.last.turn_rad_s));
     drive.went_backwards |= drive.last.speed_m_s < 0;
-    const PlanarPose moved = Moved(drive.end, drive.last.speed_m_s, drive.last.turn_rad_s, options.step_s);
+    const PlanarPose axle = Moved(Composed(drive.end, Inverse(mounting)), drive.last.speed_m_s,
+                                  drive.last.turn_rad_s, options.step_s);
+    const PlanarPose moved = Composed(axle, mounting);
     drive.end.heading_rad = moved.heading_rad;
     if (moved.position.x() > wall_x_m || moved.position.x() > drive.end.position.x()) {
       drive.end.position = moved.position;
@@ -112,6 +121,34 @@ TEST(Servo, ToleratesAWrongFocalLengthNoiseAndFalseMatches) {
   for (const double factor : {0.8, 1.0, 1.2}) {
     ExpectThere(DriveTo(scene, start, target, {}, factor), target, fmt::format("focal x {:g}", factor));
   }
+}
+
+// It turns about the middle of its axle, not about its camera.  The scene's distance is known, as in a map in
+// metres: the camera's place on the robot counts by it.
+TEST(Servo, KnowsWhereTheCameraIsOnTheRobot) {
+  ServoScene scene = Room();
+  scene.noise_px = 0.5;
+  const auto num_arrivals = [&](const PlanarPose& mounting, const ServoOptions& options) {
+    int num_there = 0;
+    for (const double x : {-1.5, -0.5, 0.3}) {
+      for (const double y : {-0.5, 0.0, 0.2}) {
+        const Drive drive = DriveTo(scene, {{x, y}, 0.1}, {}, options, 1, kNoWall, mounting);
+        num_there += drive.last.state == ServoState::kArrived && drive.end.position.norm() < 0.05;
+      }
+    }
+    return num_there;
+  };
+  for (const auto& [ahead_m, left_m, turn_deg] : {std::tuple(0.2, 0.0, 0.0), std::tuple(-0.2, 0.0, 0.0),
+                                                  std::tuple(0.0, 0.2, -30.0), std::tuple(0.2, -0.1, 10.0)}) {
+    const ServoOptions known = {.scene_distance_m = 2.5,
+                                .camera_ahead_m = ahead_m,
+                                .camera_left_m = left_m,
+                                .camera_turn_deg = turn_deg};
+    const PlanarPose mounting{{ahead_m, left_m}, RadFromDeg(turn_deg)};
+    EXPECT_EQ(num_arrivals(mounting, known), 9) << ahead_m << ", " << left_m << ", " << turn_deg;
+  }
+  EXPECT_LT(num_arrivals({{-0.2, 0}, 0}, {.scene_distance_m = 2.5}), 7) << "mounted there, and not known";
+  EXPECT_LT(num_arrivals({{0, 0}, RadFromDeg(-30)}, {.scene_distance_m = 2.5}), 7);
 }
 
 TEST(Servo, ReversesToATargetBehindIt) {

@@ -7,10 +7,14 @@
 #include "runtime/atlas/atlas_localizer.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/drive/place_model.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/localizer_options.h"
+#include "runtime/visual_map/visual_map.h"
+#include "runtime/visual_map/visual_tracker.h"
 
-// What place models have in common that callers in C and Python make.  Inline, since Python's module has a
-// copy of its own: the shared library exports none of this.
+// The options that callers in C and Python set by name, of all that they make: those that it reads, and no
+// others, so that an option without effect is refused.  Inline, since Python's module has a copy of its own:
+// the shared library exports none of this.
 namespace cairn {
 
 // All options that a look reads, and no others.
@@ -48,10 +52,46 @@ inline OptionTable DescribeOptions(AtlasSearchOptions* options) {
   return all;
 }
 
+struct SpaceTrackerOptions {
+  LocalizerOptions localizer;
+  RegionTrackerOptions tracker;
+  SureTrackerOptions sure;
+};
+inline OptionTable DescribeOptions(SpaceTrackerOptions* options) {
+  OptionTable all = DescribeOptions(&options->localizer);
+  for (const OptionTable& part :
+       {DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes),
+        DescribeOptions(&options->sure)}) {
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  return all;
+}
+
+struct FloorTrackerOptions {
+  LocalizerOptions features;  // of these, how features are found and how well they are measured
+  VisualMapOptions map;
+  VisualTrackerOptions tracker;
+  VisualFilterOptions filter;
+  VisualEstimateOptions estimate;
+};
+inline OptionTable DescribeOptions(FloorTrackerOptions* options) {
+  OptionTable all;
+  for (const OptionTable& part :
+       {DescribeOptions(&options->features.sift), DescribeOptions(&options->features.measurement),
+        DescribeOptions(&options->map), DescribeOptions(&options->tracker),
+        DescribeOptions(&options->tracker.votes), DescribeOptions(&options->filter),
+        DescribeOptions(&options->estimate)}) {
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  return all;
+}
+
 // For a name that is near to none.
 inline constexpr const char* kLookOptionsHelp =
     "place_model.h, sift.h and rerank_places.h below include/cairn list them";
 inline constexpr const char* kStartOptionsHelp = "`cairn drive --help` lists them";
+inline constexpr const char* kServoOptionsHelp =
+    "servo.h, planar_epipoles.h and sift.h below include/cairn list them";
 
 // Whether a caller's numbers can be scores of places; empty ones are not checked.  Errors: InvalidArgument.
 inline Status CheckPlaceScores(const PlaceScores& given, int num_places) {
