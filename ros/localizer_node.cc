@@ -87,6 +87,7 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("stop_after_s", &p->stop_after_s);
   reader.Read("where", &p->where);
   reader.Read("where_period_s", &p->where_period_s);
+  reader.Read("min_place_probability", &p->min_place_probability);
   *wrong = reader.wrong();
   return wrong->empty();
 }

@@ -9,8 +9,8 @@
 #include "ros/start_finder.h"
 #include "ros/steerer.h"
 #include "ros/whereabouts.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/region_tracker.h"
 #include "runtime/robot_log/shared_log.h"
 
 namespace cairn_ros {
@@ -69,12 +69,21 @@ struct MapLocalizer::State {
   std::shared_ptr<SharedLog> log;          // null: none
   std::optional<Steerer> steerer;          // with Parameters::steer
   std::optional<Whereabouts> whereabouts;  // with Parameters::where
+  double place_probability = 0;            // of the last fix's place
 
   // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, SharedLog::Open.
   Status Begin() {
     if (parameters.steer) {
       CAIRN_ASSIGN_OR_RETURN(steerer, Steerer::Make(map, parameters, robot_from_camera));
     }
+    if (!(parameters.min_place_probability >= 0 && parameters.min_place_probability < 1))
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "~min_place_probability is {}; expected 0 or more, below 1",
+                       parameters.min_place_probability);
+    if (parameters.min_place_probability > 0 && !parameters.where)
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "~min_place_probability is of the places that ~where finds; set that, or leave it out");
     if (parameters.where) {
       CAIRN_ASSIGN_OR_RETURN(whereabouts,
                              Whereabouts::Make(map, robot_from_camera, parameters.where_period_s));
@@ -102,15 +111,20 @@ struct MapLocalizer::State {
                                                    ? tracker.TrackFeatures(query.features, camera)
                                                    : localizer.LocalizeQuery(query, std::nullopt));
     if (log) log->Offer(query, found);
-    if (!whereabouts || !whereabouts->IsDue(stamp_s)) return found;
-    if (!parameters.follow) {
-      *places = whereabouts->See(query, found, stamp_s);
-      return found;
+    if (!whereabouts) return found;
+    const double needed = parameters.min_place_probability;
+    const bool is_awaited = needed > 0 && place_probability < needed;
+    if (is_awaited || whereabouts->IsDue(stamp_s)) {
+      // What a tracker expected has been in the belief already: the image by itself counts.
+      Localization alone = found;
+      if (parameters.follow) {
+        CAIRN_ASSIGN_OR_RETURN(alone, localizer.LocalizeQuery(query, std::nullopt));
+      }
+      *places = whereabouts->See(query, alone, stamp_s);
+      place_probability = found.has_fix() ? whereabouts->ProbabilityAround(found.cam_from_world) : 0;
     }
-    // What a tracker expected has been in the belief already: the image by itself counts.
-    CAIRN_ASSIGN_OR_RETURN(const Localization alone, localizer.LocalizeQuery(query, std::nullopt));
-    *places = whereabouts->See(query, alone, stamp_s);
-    return found;
+    if (!found.has_fix()) place_probability = 0;
+    return needed > 0 ? PublishIfSure(std::move(found), place_probability, needed) : found;
   }
 
   Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places) {

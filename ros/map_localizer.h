@@ -33,6 +33,7 @@ struct Parameters {
   // Which places the robot may be at is kept in mind (whereabouts.h), by an image every so many seconds.
   bool where = false;
   double where_period_s = 1;
+  double min_place_probability = 0;  // with `where`: of a fix's place, by all images so far; 0: every fix
 };
 
 struct Image {

@@ -1,5 +1,6 @@
 #include "ros/whereabouts.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -38,16 +39,20 @@ bool Whereabouts::IsDue(double image_time_s) const {
 }
 
 Places Whereabouts::See(const Query& query, const Localization& found, double image_time_s) {
-  last_image_s_ = TimeOr(image_time_s);
-  Result<Places> places = Update(query, found, image_time_s);
+  const double time_s = TimeOr(image_time_s);
+  // Of a recording that begins again: nothing is known.
+  const double seconds = std::max(0.0, time_s - std::exchange(last_image_s_, time_s).value_or(time_s));
+  Result<Places> places = Update(query, found, image_time_s, seconds);
   if (places.ok()) return std::move(places).value();
   return {.error = places.error().message};
 }
 
-Result<Places> Whereabouts::Update(const Query& query, const Localization& found, double image_time_s) {
+Result<Places> Whereabouts::Update(const Query& query, const Localization& found, double image_time_s,
+                                   double seconds) {
   const std::optional<CameraMove> move = odometry_.MoveTo(image_time_s);
   if (move && IsMetric(map_->head().frame))
     CAIRN_RETURN_IF_ERROR(belief_.Move(move->way_m, move->turn_left_rad));
+  CAIRN_RETURN_IF_ERROR(belief_.Elapse(seconds));
   CAIRN_RETURN_IF_ERROR(belief_.See(query, found));
   Places places{.elsewhere = belief_.elsewhere()};
   CAIRN_ASSIGN_OR_RETURN(const auto hypotheses, belief_.Hypotheses(static_cast<int>(map_->num_images())));

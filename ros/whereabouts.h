@@ -29,6 +29,10 @@ class Whereabouts {
   bool IsDue(double image_time_s) const;
   // The next image, and what it says by itself.
   Places See(const cairn::Query& query, const cairn::Localization& found, double image_time_s);
+  // As PlaceBelief has it.
+  double ProbabilityAround(const cairn::Pose& cam_from_world) const {
+    return belief_.ProbabilityAround(cam_from_world);
+  }
 
  private:
   Whereabouts(std::shared_ptr<const cairn::Map> map, const cairn::Pose& robot_from_camera, double period_s,
@@ -39,7 +43,7 @@ class Whereabouts {
         belief_(std::move(belief)),
         odometry_(robot_from_camera) {}
   cairn::Result<Places> Update(const cairn::Query& query, const cairn::Localization& found,
-                               double image_time_s);
+                               double image_time_s, double seconds);
 
   std::shared_ptr<const cairn::Map> map_;
   cairn::Pose robot_from_camera_;

@@ -111,7 +111,7 @@ class PlaceBelief {
   double elsewhere() const { return believed_.elsewhere; }  // P(at no place of the map)
   const std::vector<double>& probabilities() const { return believed_.at_image; }  // of each image's place
   // Of the place around a pose (cam_from_world, as fixes state it): survey images no more than five views
-  // away.
+  // away, or the nearest ones.
   double ProbabilityAround(const Pose& cam_from_world) const;
 
   // The survey image nearest to this one, by links, of which the map knows no look-alike: what would tell the

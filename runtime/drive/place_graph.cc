@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <numeric>
 #include <utility>
 
 #include "core/base/quantiles.h"
@@ -89,11 +90,7 @@ Status PlaceGraph::ReadImages() {
   }
   if (!depths.empty()) radius_ = ViewOptions().same_view_ratio * UpperMedian(std::move(depths));
   neighbours_ = LinkImages(seen, map_->num_landmarks());
-  same_place_ = neighbours_;
-  for (size_t i = 0; i < same_place_.size(); ++i) {
-    std::erase_if(same_place_[i],
-                  [&](int32_t other) { return ViewDistance(poses_[i], poses_[other]) > kPlaceViews; });
-  }
+  for (size_t i = 0; i < poses_.size(); ++i) same_place_.push_back(NearAmong(poses_[i], neighbours_[i]));
   return Ok();
 }
 
@@ -115,12 +112,26 @@ Status PlaceGraph::ReadLookAlikes() {
   return Ok();
 }
 
-std::vector<int32_t> PlaceGraph::ImagesNear(const Pose& cam_from_world) const {
+std::vector<int32_t> PlaceGraph::NearAmong(const Pose& cam_from_world,
+                                           const std::vector<int32_t>& images) const {
+  std::vector<std::pair<double, int32_t>> by_distance;
+  for (const int32_t image : images)
+    by_distance.emplace_back(ViewDistance(poses_[image], cam_from_world), image);
+  const size_t num_nearest = std::min<size_t>(kNumViewsOfPose, by_distance.size());
+  std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(num_nearest),
+                    by_distance.end());
   std::vector<int32_t> near;
-  for (size_t i = 0; i < poses_.size(); ++i) {
-    if (ViewDistance(poses_[i], cam_from_world) <= kPlaceViews) near.push_back(static_cast<int32_t>(i));
+  for (size_t i = 0; i < by_distance.size(); ++i) {
+    if (i < num_nearest || by_distance[i].first <= kPlaceViews) near.push_back(by_distance[i].second);
   }
+  std::sort(near.begin(), near.end());
   return near;
+}
+
+std::vector<int32_t> PlaceGraph::ImagesNear(const Pose& cam_from_world) const {
+  std::vector<int32_t> all(poses_.size());
+  std::iota(all.begin(), all.end(), 0);
+  return NearAmong(cam_from_world, all);
 }
 
 double PlaceGraph::ViewDistance(const Pose& a, const Pose& b) const {

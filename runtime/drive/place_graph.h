@@ -27,8 +27,8 @@ class PlaceGraph {
   double radius_deg() const;
   // Images that show enough of the same landmarks, ascending.
   const std::vector<int32_t>& Neighbours(int32_t image) const { return neighbours_[image]; }
-  // Of these the near ones: they and the image are one place.  What shows the same may stand at another
-  // corridor's end.
+  // Of these the near ones, no more than five views away, or the nearest four: they and the image are one
+  // place.  What shows the same may stand at another corridor's end.  Ascending.
   const std::vector<int32_t>& SamePlace(int32_t image) const { return same_place_[image]; }
   // All images that are as near to a pose of the map's own frame, ascending.
   std::vector<int32_t> ImagesNear(const Pose& cam_from_world) const;
@@ -65,6 +65,7 @@ class PlaceGraph {
   explicit PlaceGraph(std::shared_ptr<const Map> map) : map_(std::move(map)) {}
   Status ReadImages();
   Status ReadLookAlikes();
+  std::vector<int32_t> NearAmong(const Pose& cam_from_world, const std::vector<int32_t>& images) const;
   Result<std::vector<std::pair<int32_t, double>>> Nearest(const Pose& cam_from_world, double radius,
                                                           double radius_deg) const;
 

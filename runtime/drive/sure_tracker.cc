@@ -23,6 +23,16 @@ OptionTable DescribeOptions(SureTrackerOptions* o) {
   return table;
 }
 
+Localization PublishIfSure(Localization found, double place_probability, double min_place_probability) {
+  if (!found.has_fix()) return found;
+  found.probability = place_probability;
+  if (place_probability >= min_place_probability) return found;
+  found.reason = NoFix::kImprobable;
+  found.message = fmt::format("of all images so far its place has a probability of {:.3f}, {} is needed",
+                              place_probability, min_place_probability);
+  return found;
+}
+
 SureTracker::SureTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
                          const RegionTrackerOptions& tracker_options, const SureTrackerOptions& options)
     : map_(std::move(map)),
@@ -106,16 +116,8 @@ Result<Localization> SureTracker::TrackFeatures(Features features, const Camera&
         sure_probability_ = ProbabilityOf(found);
       }
     }
-    if (!found.has_fix()) {
-      sure_probability_ = 0;
-      return found;
-    }
-    found.probability = sure_probability_;
-    if (sure_probability_ >= options_.min_place_probability) return found;
-    sure_probability_ = 0;
-    found.reason = NoFix::kImprobable;
-    found.message = fmt::format("of all images so far its place has a probability of {:.2f}, {} is needed",
-                                found.probability, options_.min_place_probability);
+    found = PublishIfSure(std::move(found), sure_probability_, options_.min_place_probability);
+    if (!found.has_fix()) sure_probability_ = 0;
     return found;
   });
 }

@@ -29,6 +29,10 @@ struct SureTrackerOptions {
 // Those of the belief as "place_fix_ratio" and so on.
 OptionTable DescribeOptions(SureTrackerOptions* options);
 
+// The fix with the probability of its place; none (kImprobable) where that is less than needed.  Without a
+// fix as it is.
+Localization PublishIfSure(Localization found, double place_probability, double min_place_probability);
+
 // Follows a robot that may have woken up anywhere, and says where it is only when it is sure: RegionTracker
 // finds poses from frame to frame, and PlaceBelief, from frames that are localized without what is expected,
 // how probable their places are.  A tracker that follows a look-alike of where the robot is agrees with

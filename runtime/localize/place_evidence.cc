@@ -9,15 +9,12 @@
 #include "core/base/quantiles.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/promise/view_distance.h"
 #include "runtime/localize/retrieve.h"
 
 namespace cairn {
 namespace {
 
-// Two images are about one view where they differ by less than this part of the depth of what they see, or
-// by this angle (ViewOptions of core/promise/view_distance.h).
-constexpr double kSameViewRatio = 0.1;
-constexpr double kSameViewDeg = 15;
 constexpr int kNumNearViews = 8;
 
 int CellOf(const Eigen::Vector2d& pixel, const Camera& camera, int num_cells) {
@@ -41,9 +38,10 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const 
     found_idx.push_back(match.landmark);
   }
   std::sort(found_idx.begin(), found_idx.end());
-  const double radius_m = kSameViewRatio * UpperMedian(std::move(depths));
+  const ViewOptions one_view;
+  const double radius_m = one_view.same_view_ratio * UpperMedian(std::move(depths));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
-                         NearestViews(map, cam_from_world, radius_m, kSameViewDeg, kNumNearViews));
+                         NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews));
   evidence.squared_distance = near.front().squared_distance;
   std::map<LandmarkIdx, double> seen;  // sum of the weights of the images that see it
   double sum = 0;

@@ -396,6 +396,12 @@ TEST_F(CPlaces, BeliefsAreThoseOfCxx) {
     if (picture == 4) {
       ASSERT_EQ(cairn_place_belief_move(belief, 0.5, 0.1, 0.2), CAIRN_OK) << cairn_last_error();
       ASSERT_TRUE(expected.Move({0.5, 0.1}, 0.2).ok());
+      ASSERT_EQ(cairn_place_belief_elapse(belief, 0.25), CAIRN_OK) << cairn_last_error();
+      ASSERT_TRUE(expected.Elapse(0.25).ok());
+    }
+    if (picture == 5) {
+      ASSERT_EQ(cairn_place_belief_sense_up(belief, 0.1, -0.9, 0.2, 3), CAIRN_OK) << cairn_last_error();
+      ASSERT_TRUE(expected.SenseUp({0.1, -0.9, 0.2}, 3).ok());
     }
     ASSERT_EQ(cairn_place_belief_see(belief, &image, nullptr, picture == 1 ? nullptr : &fix), CAIRN_OK)
         << cairn_last_error();
@@ -434,6 +440,9 @@ TEST_F(CPlaces, MisuseOfBeliefsIsSaid) {
   EXPECT_THAT(cairn_last_error(), HasSubstr("elsewhere_ratio"));
   EXPECT_EQ(cairn_place_belief_move(belief, std::numeric_limits<double>::quiet_NaN(), 0, 0),
             CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_elapse(belief, -1), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_sense_up(belief, 0, 0, 0, 1), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_sense_up(belief, 0, -1, 0, 0), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_place_belief_see(belief, nullptr, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
   int32_t num_places = 7, image = 0;
   EXPECT_EQ(cairn_place_belief_places(belief, nullptr, nullptr, 1, &num_places, nullptr),

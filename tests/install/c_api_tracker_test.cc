@@ -13,6 +13,7 @@
 
 #include "core/capture/capture.h"
 #include "runtime/c_api/cairn.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 #include "runtime/visual_map/visual_tracker.h"
@@ -130,6 +131,32 @@ TEST_F(CTrackers, InSpaceGiveTheFixesOfTheCxxTrackerBitForBit) {
     ExpectSamePose(prior.rotation_wxyz, prior.translation_m, tracker.Prediction()->cam_from_world);
     EXPECT_EQ(prior.sigma_m, tracker.Prediction()->sigma_m);
     EXPECT_EQ(prior.sigma_deg, tracker.Prediction()->sigma_deg);
+  }
+}
+
+TEST_F(CTrackers, PublishWhatIsSureAsTheCxxTrackerDoes) {
+  EXPECT_EQ(cairn_tracker_move(tracker_, 0.1, 0, 0), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_tracker_elapse(tracker_, 0.1), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), testing::HasSubstr("min_place_probability"));
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "min_place_probability", "0.97"), CAIRN_OK)
+      << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "place_elsewhere_ratio", "0.6"), CAIRN_OK)
+      << cairn_last_error();
+  SureTrackerOptions options{.min_place_probability = 0.97};
+  options.belief.elsewhere_ratio = 0.6;
+  auto tracker = *SureTracker::Make(map_, {}, {}, options);
+  for (int i = 0; i < static_cast<int>(Drive().frames().size()); ++i) {
+    const DriveFrame& frame = Drive().frames()[i];
+    ASSERT_EQ(cairn_tracker_elapse(tracker_, 0.4), CAIRN_OK);
+    ASSERT_TRUE(tracker.Elapse(0.4).ok());
+    if (i > 0) {
+      ASSERT_EQ(cairn_tracker_move(tracker_, frame.ahead_m, 0, 0), CAIRN_OK) << cairn_last_error();
+      ASSERT_TRUE(tracker.Move({frame.ahead_m, 0}, 0).ok());
+    }
+    ASSERT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_OK) << cairn_last_error();
+    ASSERT_TRUE(tracker.SenseUp({0, -1, 0}, 2).ok());
+    ExpectSame(Track(i), *tracker.Track(frame.picture, QueryCamera()));
   }
 }
 

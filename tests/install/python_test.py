@@ -3,6 +3,7 @@
 python_test.py POSTER PROGRAM: the folder of make_poster_map, the program `cairn`.
 """
 import json
+import math
 import pathlib
 import shutil
 import sqlite3
@@ -272,8 +273,11 @@ class Starting(unittest.TestCase):
             self.assertEqual(belief.elsewhere, expected["elsewhere"])
         self.assertEqual(belief.places(0), [])
         belief.move(0.5, 0, 0.1)
+        belief.elapse(0.5)
+        belief.sense_up((0, -1, 0.1), 2)
         self.assertEqual(cairn.PlaceBelief(self.map, elsewhere_ratio=0.25).elsewhere, 0.25)
         for wrong in (lambda: cairn.PlaceBelief(self.map, elsewhere_ratio=2), lambda: belief.move(float("nan"), 0, 0),
+                      lambda: belief.elapse(-1), lambda: belief.sense_up((0, 0, 0), 2), lambda: belief.sense_up((0, -1, 0), 0),
                       lambda: cairn.PlaceBelief(self.map, elsewhere=0.1)):
             with self.assertRaises((cairn.Error, ValueError)):
                 wrong()
@@ -559,6 +563,21 @@ class Following(unittest.TestCase):
         run = subprocess.run([PROGRAM, "localize", POSTER / "drive.cairn", *self.frames, "--sequence", *words],
                              capture_output=True, check=True, text=True)
         return [json.loads(line) for line in run.stdout.splitlines()]
+
+    def test_publishes_what_is_sure_as_the_program_does(self):
+        options = ["--min-place-probability", "0.97", "--period", "0.4", "--odometry", POSTER / "odometry.txt"]
+        tracker = cairn.Tracker(self.map, min_place_probability=0.97)
+        for i, (frame, expected) in enumerate(zip(self.frames, self.printed(*options))):
+            tracker.elapse(0.4)
+            if i > 0:
+                ahead_m, left_m, turn_deg = self.odometry[i]
+                tracker.move(ahead_m, left_m, turn_deg * math.pi / 180)
+            fix = tracker.track(read_pgm(frame))
+            self.assertEqual(bool(fix), expected["fix"])
+            self.assertEqual(fix.probability, expected.get("probability", 0))
+        with self.assertRaises(cairn.Error) as caught:
+            cairn.Tracker(self.map).move(1, 0, 0)
+        self.assertIn("min_place_probability", str(caught.exception))
 
     def test_in_space_gives_the_programs_poses_bit_for_bit(self):
         tracker = cairn.Tracker(self.map)

@@ -1,0 +1,131 @@
+#include "runtime/drive/sure_tracker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+const SyntheticRoom& Room() {
+  static const SyntheticRoom room = MakeSyntheticRoom(1);
+  return room;
+}
+
+std::shared_ptr<const Map> RoomMap() {
+  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
+  return map;
+}
+
+// Frame i of a drive around the room's middle: 10 cm and 3 degrees a frame.
+Pose OnDrive(int i) {
+  const double angle_deg = 3.0 * i;
+  const double angle = RadFromDeg(angle_deg);
+  return PoseAt({2 * std::cos(angle), 2 * std::sin(angle), 1.2}, angle_deg + 90);
+}
+
+SureTracker Make(const SureTrackerOptions& options) { return *SureTracker::Make(RoomMap(), {}, {}, options); }
+
+Localization Show(SureTracker* tracker, const Pose& pose, int frame) {
+  return *tracker->TrackFeatures(RenderFeatures(Room(), pose, {}, 500 + frame), Room().camera);
+}
+
+TEST(SureTracker, WithoutAProbabilityItIsARegionTracker) {
+  SureTracker every = Make({});
+  RegionTracker plain(RoomMap());
+  EXPECT_FALSE(every.belief());
+  for (int i = 0; i < 3; ++i) {
+    const Localization found = Show(&every, OnDrive(i), i);
+    const Localization expected =
+        *plain.TrackFeatures(RenderFeatures(Room(), OnDrive(i), {}, 500 + i), Room().camera);
+    ASSERT_TRUE(found.has_fix());
+    EXPECT_EQ(found.cam_from_world.translation, expected.cam_from_world.translation);
+    EXPECT_EQ(found.probability, expected.probability);
+  }
+  for (const Status& status : {every.Move({1, 0}, 0), every.Elapse(1), every.SenseUp({0, -1, 0}, 1)}) {
+    ASSERT_FALSE(status.ok());
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(status.error().message, testing::HasSubstr("min_place_probability"));
+  }
+}
+
+TEST(SureTracker, AFixIsPublishedWhenItsPlaceIsSure) {
+  // Nine of ten times it wakes up elsewhere, and one fix has odds of 100: 11 to 1.  The drive shows more.
+  SureTracker tracker = Make({.min_place_probability = 0.95, .belief = {.elsewhere_ratio = 0.9}});
+  const Localization first = Show(&tracker, OnDrive(0), 0);
+  EXPECT_EQ(first.reason, NoFix::kImprobable);
+  EXPECT_NEAR(first.probability, 0.99 * 100 / 109, 0.03);
+  EXPECT_THAT(first.message, testing::HasSubstr("0.95 is needed"));
+  int first_published = -1;
+  for (int i = 1; i < 12; ++i) {
+    const Localization found = Show(&tracker, OnDrive(i), i);
+    if (!found.has_fix()) continue;
+    if (first_published < 0) first_published = i;
+    EXPECT_GE(found.probability, 0.95);
+    EXPECT_LT(CenterErrorM(found.cam_from_world, OnDrive(i)), 0.05);
+  }
+  EXPECT_GT(first_published, 0);
+  // At once, where less is asked for.
+  SureTracker bold = Make({.min_place_probability = 0.9});
+  EXPECT_TRUE(Show(&bold, OnDrive(0), 0).has_fix());
+}
+
+TEST(SureTracker, WhileItIsSureFramesAreLookedAtAnewBySeconds) {
+  SureTracker tracker = Make({.min_place_probability = 0.9, .look_anew_s = 1});
+  std::vector<double> probabilities;
+  for (int i = 0; i < 25; ++i) {
+    ASSERT_TRUE(tracker.Elapse(0.1).ok());
+    const Localization found = Show(&tracker, OnDrive(i), i);
+    ASSERT_TRUE(found.has_fix()) << i << ": " << found.message;
+    EXPECT_EQ(found.scope == Scope::kTrack, i > 0) << i;
+    probabilities.push_back(found.probability);
+  }
+  // Between looks it is as sure as at the last.
+  EXPECT_EQ(probabilities[9], probabilities[1]);
+  EXPECT_NE(probabilities[12], probabilities[9]);
+  EXPECT_EQ(probabilities[19], probabilities[12]);
+}
+
+TEST(SureTracker, WhatGravityContradictsIsNotPublished) {
+  SureTracker upright = Make({.min_place_probability = 0.9}), tilted = Make({.min_place_probability = 0.9});
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_TRUE(upright.SenseUp({0, -1, 0}, 2).ok());
+    EXPECT_TRUE(Show(&upright, OnDrive(i), i).has_fix());
+    ASSERT_TRUE(tilted.SenseUp({0.7, -0.7, 0}, 2).ok());
+    EXPECT_EQ(Show(&tilted, OnDrive(i), i).reason, NoFix::kImprobable);
+  }
+  EXPECT_GT(tilted.belief()->elsewhere(), 0.7);
+  EXPECT_FALSE(tilted.SenseUp({0, 0, 0}, 2).ok());
+}
+
+TEST(SureTracker, ACarriedRobotIsPublishedAgainWhenItIsSure) {
+  SureTracker tracker = Make({.min_place_probability = 0.9});
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(Show(&tracker, OnDrive(i), i).has_fix());
+  const auto [opposite, num_withheld] = [&] {
+    int withheld = 0;
+    for (int i = 60; i < 70; ++i) {
+      const Localization found = Show(&tracker, OnDrive(i), i);
+      if (found.has_fix()) return std::pair(found.cam_from_world, withheld);
+      ++withheld;
+    }
+    return std::pair(Pose(), withheld);
+  }();
+  EXPECT_LT(num_withheld, 8);
+  EXPECT_LT(CenterErrorM(opposite, OnDrive(60 + num_withheld)), 0.05);
+}
+
+TEST(SureTracker, RefusesWhatCannotBe) {
+  EXPECT_EQ(SureTracker::Make(RoomMap(), {}, {}, {.min_place_probability = 1}).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(SureTracker::Make(RoomMap(), {}, {}, {.look_anew_s = -1}).error().code,
+            ErrorCode::kInvalidArgument);
+  MapRows empty;
+  empty.name = "empty";
+  const auto map = *Map::FromRows(empty);
+  EXPECT_EQ(SureTracker::Make(map, {}, {}, {.min_place_probability = 0.9}).error().code, ErrorCode::kNoData);
+  EXPECT_TRUE(SureTracker::Make(map, {}, {}, {}).ok());
+}
+
+}  // namespace
+}  // namespace cairn
