@@ -208,6 +208,7 @@ class LocalizerNode {
 
   void OnProgress(const std_msgs::String::ConstPtr& word) {
     asked_ = ros::Time::now();
+    if (velocity_) velocity_->Stop();
     PublishStarts(localizer_->Report(word->data), asked_);
   }
 

@@ -110,21 +110,40 @@ struct MapLocalizer::State {
     CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow
                                                    ? tracker.TrackFeatures(query.features, camera)
                                                    : localizer.LocalizeQuery(query, std::nullopt));
+    if (whereabouts) {
+      CAIRN_RETURN_IF_ERROR(Believe(query, camera, stamp_s, &found, places));
+    }
     if (log) log->Offer(query, found);
-    if (!whereabouts) return found;
+    return found;
+  }
+
+  // What the frame says of places, and whether its fix, if it has one, is sure.
+  Status Believe(const Query& query, const Camera& camera, double stamp_s, Localization* found,
+                 std::optional<Places>* places) {
     const double needed = parameters.min_place_probability;
-    const bool is_awaited = needed > 0 && place_probability < needed;
+    const bool is_followed = found->scope == Scope::kTrack;
+    const bool is_awaited = needed > 0 && (place_probability < needed || !is_followed);
     if (is_awaited || whereabouts->IsDue(stamp_s)) {
       // What a tracker expected has been in the belief already: the image by itself counts.
-      Localization alone = found;
-      if (parameters.follow) {
+      Localization alone = *found;
+      if (is_followed) {
         CAIRN_ASSIGN_OR_RETURN(alone, localizer.LocalizeQuery(query, std::nullopt));
       }
       *places = whereabouts->See(query, alone, stamp_s);
-      place_probability = found.has_fix() ? whereabouts->ProbabilityAround(found.cam_from_world) : 0;
+      const auto probability_of = [&](const Localization& fix) {
+        const bool is_known = fix.has_fix() && (*places)->error.empty();
+        return is_known ? whereabouts->ProbabilityAround(fix.cam_from_world) : 0;
+      };
+      place_probability = probability_of(*found);
+      if (needed > 0 && is_followed && place_probability < needed && probability_of(alone) >= needed) {
+        tracker = RegionTracker(map);  // it followed a look-alike
+        CAIRN_ASSIGN_OR_RETURN(*found, tracker.TrackFeatures(query.features, camera));
+        place_probability = probability_of(*found);
+      }
     }
-    if (!found.has_fix()) place_probability = 0;
-    return needed > 0 ? PublishIfSure(std::move(found), place_probability, needed) : found;
+    if (!found->has_fix()) place_probability = 0;
+    if (needed > 0) *found = PublishIfSure(std::move(*found), place_probability, needed);
+    return Ok();
   }
 
   Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places) {

@@ -8,8 +8,10 @@
 namespace cairn {
 namespace {
 
-// An image that took longer than this on its way gets the oldest pose: odometry of 1000 Hz for 4 s.
+// Odometry of 1000 Hz for 4 s: of an image that took longer on its way nothing is known.
 constexpr size_t kMaxNumPoses = 4000;
+// Odometry that has ended says no more that the robot stands.
+constexpr double kMaxAgeS = 0.5;
 
 PlanarPose Compose(const PlanarPose& a, const PlanarPose& b) {
   return {a.FloorFromRobot(b.position), WrapAngle(a.heading_rad + b.heading_rad)};
@@ -39,6 +41,7 @@ Status Odometry::Add(double time_s, const PlanarPose& odom_from_robot) {
 
 std::optional<PlanarPose> Odometry::At(double time_s) const {
   if (poses_.empty()) return std::nullopt;
+  if (time_s > poses_.back().time_s + kMaxAgeS) return std::nullopt;
   if (time_s == 0 || time_s >= poses_.back().time_s) return poses_.back().odom_from_robot;
   const auto after = std::upper_bound(poses_.begin(), poses_.end(), time_s,
                                       [](double time, const TimedPose& pose) { return time < pose.time_s; });

@@ -40,9 +40,13 @@ bool Whereabouts::IsDue(double image_time_s) const {
 
 Places Whereabouts::See(const Query& query, const Localization& found, double image_time_s) {
   const double time_s = TimeOr(image_time_s);
-  // Of a recording that begins again: nothing is known.
-  const double seconds = std::max(0.0, time_s - std::exchange(last_image_s_, time_s).value_or(time_s));
-  Result<Places> places = Update(query, found, image_time_s, seconds);
+  const double seconds = time_s - std::exchange(last_image_s_, time_s).value_or(time_s);
+  if (seconds < 0) {  // a recording begins again: nothing is known
+    Result<PlaceBelief> anew = PlaceBelief::Make(map_);
+    if (!anew.ok()) return {.error = anew.error().message};
+    belief_ = std::move(anew).value();
+  }
+  Result<Places> places = Update(query, found, image_time_s, std::max(0.0, seconds));
   if (places.ok()) return std::move(places).value();
   return {.error = places.error().message};
 }

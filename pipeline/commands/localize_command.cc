@@ -88,6 +88,14 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
           "--odometry is for --estimator visual-map or both, or for --min-place-probability; give "
           "one of them, or leave it out");
   }
+  if (arguments.odometry_path.empty()) {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"place_way_sigma_ratio", "place_turn_sigma_ratio", "place_way_sigma_m", "place_turn_sigma_deg"},
+        "is the error of odometry; give --odometry, or leave it out"));
+  } else {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"place_reach_links"}, "is for images without odometry; leave it out"));
+  }
   if (arguments.sure_options.min_place_probability == 0) {
     SureTrackerOptions of_sure;
     std::vector<std::string> names = NamesOf(DescribeOptions(&of_sure));
@@ -446,6 +454,9 @@ Command LocalizeCommand() {
                   DescribeOptions(&arguments->atlas_options)}) {
               options.insert(options.end(), more.begin(), more.end());
             }
+            // Gravity comes through the libraries alone.
+            std::erase_if(options,
+                          [](const Option& option) { return option.name == "place_map_up_sigma_deg"; });
             arguments->option_arguments.Add(
                 parser, options,
                 {"max_num_features", "max_image_side_px", "min_num_inliers", "max_sigma_m", "max_sigma_deg",

@@ -29,7 +29,7 @@ struct WhereArguments {
   std::string cameras_path;
   std::string odometry_path;
   std::string gravity_path;
-  double gravity_sigma_deg = 2;
+  double gravity_sigma_deg = 0;  // 0: not given
   double period_s = 1;
   int num_places = 3;
   bool json = false;
@@ -109,6 +109,9 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
   if (arguments.gravity_path.empty()) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"map_up_sigma_deg"}, "is for gravity; give --gravity, or leave it out"));
+    if (arguments.gravity_sigma_deg > 0)
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
   }
   cv::setNumThreads(1);
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
@@ -139,7 +142,9 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     }
     if (gravity) {
       CAIRN_ASSIGN_OR_RETURN(const Eigen::Vector3d up, gravity->Next(image));
-      CAIRN_RETURN_IF_ERROR(belief.SenseUp(up, arguments.gravity_sigma_deg));
+      constexpr double kUsualSigmaDeg = 2;
+      const double sigma_deg = arguments.gravity_sigma_deg > 0 ? arguments.gravity_sigma_deg : kUsualSigmaDeg;
+      CAIRN_RETURN_IF_ERROR(belief.SenseUp(up, sigma_deg));
     }
     CAIRN_RETURN_IF_ERROR(belief.Elapse(arguments.period_s));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));

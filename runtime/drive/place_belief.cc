@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -210,6 +211,9 @@ void PlaceBelief::LeaveAndReturn(double seconds, Distribution* distribution) con
 
 Status PlaceBelief::See(const Query& query, const Localization& found) {
   return WithoutExceptions("place belief", [&]() -> Status {
+    if (found.possible_probabilities.size() != found.possible_poses.size())
+      return MakeError(ErrorCode::kInvalidArgument, "{} possible poses with {} probabilities",
+                       found.possible_poses.size(), found.possible_probabilities.size());
     const double elapsed_s = std::exchange(elapsed_s_, std::nullopt).value_or(1);
     const auto up = std::exchange(up_, std::nullopt);
     const bool is_first = !std::exchange(has_seen_, true);
@@ -233,7 +237,7 @@ Status PlaceBelief::See(const Query& query, const Localization& found) {
         const std::vector<double> probabilities =
             found.has_fix() ? std::vector<double>{found.probability} : found.possible_probabilities;
         CAIRN_ASSIGN_OR_RETURN(const Evidence evidence, OfFix(poses, probabilities, up));
-        Weigh(evidence, NewRatio(poses.front(), seconds));
+        Weigh(evidence, NewRatio(poses, seconds));
       }
       driven_views_ = 0;
     }
@@ -271,12 +275,13 @@ Result<PlaceBelief::Evidence> PlaceBelief::OfFix(const std::vector<Pose>& poses,
     const std::vector<int32_t>& around = evidence.places[k].images;
     for (const int32_t image : around) evidence.at_image[image] += right;
     // Of a look-alike it has the odds of a right one.
-    for (size_t i = 0; i < evidence.at_image.size(); ++i) {
-      const std::vector<int32_t>& rivals = graph_->LookAlikes(static_cast<int32_t>(i));
-      const bool is_here = std::any_of(rivals.begin(), rivals.end(), [&](int32_t image) {
-        return std::binary_search(around.begin(), around.end(), image);
-      });
-      if (is_here) evidence.at_image[i] += options_.look_alike_fix_ratio / options_.fix_ratio * right;
+    std::vector<char> is_rival(evidence.at_image.size());
+    for (const int32_t image : around) {
+      for (const int32_t rival : graph_->LookAlikes(image)) is_rival[rival] = 1;
+    }
+    for (size_t i = 0; i < is_rival.size(); ++i) {
+      if (is_rival[i] != 0)
+        evidence.at_image[i] += options_.look_alike_fix_ratio / options_.fix_ratio * right;
     }
   }
   return evidence;
@@ -312,13 +317,17 @@ Result<PlaceBelief::Evidence> PlaceBelief::OfLikeness(const Query& query) const 
   return evidence;
 }
 
-double PlaceBelief::NewRatio(const Pose& fix, double seconds) {
-  const double distance = last_fix_ ? graph_->ViewDistance(fix, *last_fix_) : 1;
+double PlaceBelief::NewRatio(const std::vector<Pose>& poses, double seconds) {
+  // Of the same places in another order nothing is new.
+  double distance = last_poses_.empty() ? 1 : std::numeric_limits<double>::infinity();
+  for (const Pose& last : last_poses_) {
+    for (const Pose& pose : poses) distance = std::min(distance, graph_->ViewDistance(pose, last));
+  }
   const double is_new = distance - counted_views_;
   // Fixes around one place differ by their errors: only how far they are from it in all counts.
   counted_views_ = std::max(counted_views_, distance);
   if (distance >= 1) {
-    last_fix_ = fix;
+    last_poses_ = poses;
     counted_views_ = 0;
   }
   return std::clamp(is_new, std::min(1.0, options_.least_new_ratio * seconds), 1.0);
@@ -365,12 +374,14 @@ void PlaceBelief::Publish() {
 
 Result<std::vector<PlaceHypothesis>> PlaceBelief::Hypotheses(int max_num) const {
   std::vector<double> left = believed_.at_image;
+  std::vector<int32_t> order(left.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return left[a] > left[b]; });
   std::vector<PlaceHypothesis> hypotheses;
-  while (static_cast<int>(hypotheses.size()) < max_num) {
+  for (const int32_t image : order) {
+    if (static_cast<int>(hypotheses.size()) >= max_num) break;
     // Of a place the image whose surroundings are likeliest, so that neighbours of alike probability are one.
-    const auto best = std::max_element(left.begin(), left.end());
-    if (*best <= 0) break;
-    const auto image = static_cast<int32_t>(best - left.begin());
+    if (left[image] <= 0) continue;
     PlaceHypothesis hypothesis{.image = image, .probability = std::exchange(left[image], 0)};
     for (const int32_t neighbour : graph_->SamePlace(image))
       hypothesis.probability += std::exchange(left[neighbour], 0);

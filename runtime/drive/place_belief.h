@@ -102,8 +102,8 @@ class PlaceBelief {
   Status SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg);
 
   // The next image, and what Localizer::LocalizeQuery says of it without a prior: one from earlier images
-  // would count them twice.  Without Move since the last: it went anywhere within reach.  Errors: Corrupt,
-  // Io.
+  // would count them twice.  Without Move since the last: it went anywhere within reach.  Errors:
+  // InvalidArgument (possible poses without their probabilities), Corrupt, Io.
   Status See(const Query& query, const Localization& found);
 
   // The likeliest first; each image belongs to one.
@@ -145,7 +145,7 @@ class PlaceBelief {
   double UprightRatio(const Pose& cam_from_world, const std::optional<Up>& up) const;
   Result<Evidence> OfLikeness(const Query& query) const;
   // By how much a fix, or an image without one, tells more than those before.
-  double NewRatio(const Pose& fix, double seconds);
+  double NewRatio(const std::vector<Pose>& poses, double seconds);
   double NewRatio(double seconds) const;
   void Weigh(const Evidence& evidence, double new_ratio);
   void Publish();
@@ -166,8 +166,8 @@ class PlaceBelief {
   // Since belief last moved: in the frame of the robot there.
   Eigen::Vector2d way_m_ = Eigen::Vector2d::Zero();
   double turn_left_rad_ = 0;
-  // The fix from which new ones are told, and how far from it they were.
-  std::optional<Pose> last_fix_;
+  // The places from which new ones are told, and how far from them they were.
+  std::vector<Pose> last_poses_;
   double counted_views_ = 0;
 };
 

@@ -28,8 +28,8 @@ constexpr double kMinSharedRatio = 0.1;
 constexpr int kMinNumShared = 3;
 // Of a landmark that more images see, so many tell which of them are linked.
 constexpr size_t kMaxImagesOfLandmark = 100;
-// A probability that is not worth moving.
-constexpr double kNegligible = 1e-7;
+// A probability that is not worth moving: this part of what each place has where nothing is known.
+constexpr double kNegligibleRatio = 0.1;
 
 std::vector<std::vector<int32_t>> LinkImages(const std::vector<std::vector<LandmarkIdx>>& seen,
                                              int64_t num_landmarks) {
@@ -216,11 +216,12 @@ Status PlaceGraph::Drive(const Eigen::Vector2d& way_m, double turn_left_rad, dou
   const Pose& floor_from_world = map_->head().floor_from_world;
   const Pose world_from_floor = floor_from_world.Inverse();
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_left_rad, Eigen::Vector3d::UnitZ()));
+  const double negligible = kNegligibleRatio / static_cast<double>(poses_.size());
   std::vector<std::vector<double>> next(probabilities.size(), std::vector<double>(poses_.size()));
   for (size_t i = 0; i < poses_.size(); ++i) {
     std::vector<std::pair<int32_t, double>> shares = {{static_cast<int32_t>(i), 1.0}};
     if (std::any_of(probabilities.begin(), probabilities.end(),
-                    [&](const auto* probability) { return (*probability)[i] >= kNegligible; })) {
+                    [&](const auto* probability) { return (*probability)[i] >= negligible; })) {
       // The robot's heading is the camera's over the floor.
       const Pose floor_from_cam = floor_from_world * poses_[i].Inverse();
       const Eigen::Vector3d ahead3 = floor_from_cam.rotation * Eigen::Vector3d::UnitZ();

@@ -109,8 +109,8 @@ Result<Localization> SureTracker::TrackFeatures(Features features, const Camera&
       CAIRN_ASSIGN_OR_RETURN(const Localization anew, LookAnew(query, found));
       sure_probability_ = ProbabilityOf(found);
       const double elsewhere = ProbabilityOf(anew);
-      if (is_followed && elsewhere >= options_.min_place_probability &&
-          elsewhere > sure_probability_) {  // it followed something else
+      if (is_followed && sure_probability_ < options_.min_place_probability &&
+          elsewhere >= options_.min_place_probability) {  // it followed a look-alike
         tracker_.emplace(map_, localizer_options_, tracker_options_);
         CAIRN_ASSIGN_OR_RETURN(found, tracker_->TrackFeatures(std::move(features), camera));
         sure_probability_ = ProbabilityOf(found);

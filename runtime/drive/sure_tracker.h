@@ -52,7 +52,8 @@ class SureTracker {
   Status SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg);
 
   // The next frame.  `probability` is that of the place by all frames so far; a fix whose place has too
-  // little is none (kImprobable).  Errors: as RegionTracker and PlaceBelief.
+  // little is none (kImprobable).  Errors: as RegionTracker and PlaceBelief; where the map's blocks turn out
+  // to be damaged, the tracker may have taken the frame in already.
   Result<Localization> Track(const cv::Mat& grey, const Camera& camera);
   Result<Localization> TrackFeatures(Features features, const Camera& camera);
 

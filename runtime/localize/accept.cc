@@ -264,9 +264,23 @@ Localization DecideAmong(const std::vector<Localization>& found, double least_od
     const auto is_here = [&](const Explanation& other) {
       return !AreFarApart(places[i].cam_from_world, other.cam_from_world, accept);
     };
-    places.erase(std::remove_if(places.begin() + static_cast<std::ptrdiff_t>(i) + 1, places.end(), is_here),
-                 places.end());
+    const auto others = places.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+    if (places[i].fix == nullptr) {  // a fix knows its place better
+      const auto fix = std::find_if(others, places.end(), [&](const Explanation& other) {
+        return other.fix != nullptr && is_here(other);
+      });
+      if (fix != places.end()) {
+        places[i].fix = fix->fix;
+        places[i].odds = fix->odds;
+      }
+    }
+    places.erase(std::remove_if(others, places.end(), is_here), places.end());
   }
+  const Explanation likeliest = *std::max_element(
+      places.begin(), places.end(), [](const auto& a, const auto& b) { return a.odds < b.odds; });
+  constexpr double kHopeless = 1e-3;
+  if (likeliest.fix != nullptr)
+    std::erase_if(places, [&](const Explanation& place) { return place.odds < kHopeless * likeliest.odds; });
   const Explanation& best = places.front();
   double odds_of_all = 0;
   for (const Explanation& place : places) odds_of_all += place.odds;
@@ -279,8 +293,7 @@ Localization DecideAmong(const std::vector<Localization>& found, double least_od
     // How many landmarks a place has says how often it was surveyed; the odds know what was to be expected.
     const bool is_alike = place.num_matches >= accept.max_second_pose_ratio * best.num_matches ||
                           place.odds * least_odds > best.odds;
-    constexpr double kHopeless = 1e-3;
-    if (&place != &best && (!is_alike || place.odds < kHopeless * best.odds)) continue;
+    if (&place != &best && !is_alike) continue;
     poses.push_back(place.cam_from_world);
     odds.push_back(place.odds);
     numbers += fmt::format("{}{}", numbers.empty() ? "" : " and ", place.num_matches);

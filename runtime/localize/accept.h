@@ -48,8 +48,8 @@ Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::
 // their numbers of matches compare where each was found among the landmarks of its own place, or all among
 // the same.  Those at one place count once, by the one with most matches.  The fix with most, or ambiguous
 // between it and every other place with max_second_pose_ratio of its matches, or with more than 1 /
-// least_odds of its odds.  A place a thousand times less likely is not counted, however many matches it has.
-// REQUIRES: at least one; least_odds >= 1
+// least_odds of its odds (max_second_pose_ratio 0: neither is tested).  A place a thousand times less likely
+// than a fix is not counted, however many matches it has.  REQUIRES: at least one; least_odds >= 1
 Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
                          const AcceptOptions& accept);
 

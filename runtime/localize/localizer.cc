@@ -256,6 +256,7 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     return Try(query, {Scope::kImages, std::move(landmarks)});
   };
   std::vector<Localization> found;
+  std::vector<Pose> tried = {best.cam_from_world};
   CAIRN_ASSIGN_OR_RETURN(Localization here, try_at(near));
   const bool is_here =
       here.has_fix() && !AreFarApart(here.cam_from_world, best.cam_from_world, options_.accept);
@@ -268,10 +269,12 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     // Where the camera would be there.
     CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(image));
     const Pose there = cam_from_nearest * other_image->cam_from_world;
-    const bool is_known = std::any_of(found.begin(), found.end(), [&](const Localization& each) {
-      return each.has_fix() && !AreFarApart(each.cam_from_world, there, options_.accept);
+    // Of a place many images look alike.
+    const bool was_tried = std::any_of(tried.begin(), tried.end(), [&](const Pose& each) {
+      return !AreFarApart(each, there, options_.accept);
     });
-    if (is_known) continue;
+    if (was_tried) continue;
+    tried.push_back(there);
     CAIRN_ASSIGN_OR_RETURN(const auto candidates,
                            RetrieveByPrior(*map_, {given_from_camera * there, 0, 0}, options_.retrieve));
     CAIRN_ASSIGN_OR_RETURN(Localization other, try_at(candidates));

@@ -311,6 +311,16 @@ TEST(PlaceBelief, FixesThatJitterTellNoMoreThanOneThatStays) {
   EXPECT_NEAR(std::log10(jitters.elsewhere()), std::log10(still.elsewhere()), 0.1);
 }
 
+TEST(PlaceBelief, TheSamePlacesInAnotherOrderAreNoNewView) {
+  PlaceBelief same = Make(), flips = Make();
+  for (int i = 0; i < 20; ++i) {
+    for (PlaceBelief* each : {&same, &flips}) ASSERT_TRUE(each->Elapse(0.05).ok());
+    See(&same, Ambiguous(2, 8));
+    See(&flips, i % 2 == 0 ? Ambiguous(2, 8) : Ambiguous(8, 2));
+  }
+  EXPECT_NEAR(std::log10(flips.elsewhere()), std::log10(same.elsewhere()), 1e-6);
+}
+
 TEST(PlaceBelief, WhileNothingIsSeenItForgetsByTheTime) {
   PlaceBelief soon = Make(), late = Make();
   for (PlaceBelief* each : {&soon, &late}) {
@@ -389,6 +399,9 @@ TEST(PlaceBelief, RefusesWhatItCannotUse) {
        {std::pair(Eigen::Vector3d(0, 0, 0), 1.0), std::pair(Eigen::Vector3d(0, std::nan(""), 1), 1.0),
         std::pair(Eigen::Vector3d(0, -1, 0), 0.0), std::pair(Eigen::Vector3d(0, -1, 0), std::nan(""))})
     EXPECT_EQ(belief.SenseUp(up, sigma_deg).error().code, ErrorCode::kInvalidArgument);
+  Localization without_probabilities = Ambiguous(2, 8);
+  without_probabilities.possible_probabilities.clear();
+  EXPECT_EQ(belief.See(Query(), without_probabilities).error().code, ErrorCode::kInvalidArgument);
   MapRows unscaled = Corridor();
   unscaled.frame.unit = "arbitrary";
   EXPECT_EQ(Make(unscaled).Move({1, 0}, 0).error().code, ErrorCode::kUnsupported);

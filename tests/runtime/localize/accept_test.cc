@@ -82,5 +82,20 @@ TEST(DecideAmong, AFixAtAPlaceOfAnAmbiguousAnswerDoesNotDecideForIt) {
   EXPECT_TRUE(DecideAmong({ambiguous, FixAt(9, 70, 300)}, kAsLikely, {}).has_fix());
 }
 
+TEST(DecideAmong, AHopelessPlaceIsNotCountedHoweverManyMatchesItHas) {
+  const Localization decided = DecideAmong({FixAt(0, 90, 0.9), FixAt(5, 20, 1000)}, 100, {});
+  ASSERT_TRUE(decided.has_fix());
+  EXPECT_DOUBLE_EQ(decided.cam_from_world.Center().x(), 5);
+  EXPECT_EQ(DecideAmong({FixAt(0, 90, 1.1), FixAt(5, 20, 1000)}, 100, {}).reason, NoFix::kAmbiguous);
+}
+
+TEST(DecideAmong, AFixKnowsItsPlaceBetterThanAnAmbiguousAnswerDoes) {
+  const Localization ambiguous = DecideAmong({FixAt(0, 40, 30), FixAt(5, 40, 30)}, kAsLikely, {});
+  // The fix at 5 m has fewer matches, and odds that leave the other place far behind.
+  const Localization decided = DecideAmong({ambiguous, FixAt(5, 30, 1e6)}, kAsLikely, {});
+  ASSERT_TRUE(decided.has_fix()) << decided.message;
+  EXPECT_DOUBLE_EQ(decided.cam_from_world.Center().x(), 5);
+}
+
 }  // namespace
 }  // namespace cairn
