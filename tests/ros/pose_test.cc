@@ -151,8 +151,11 @@ TEST(Odometry, TakesTheImagesTimeBetweenTwoPoses) {
   ASSERT_TRUE(move);
   EXPECT_NEAR(move->way_m.norm(), 1, 1e-12);
   EXPECT_NEAR(move->turn_left_rad, 0.25 * (2 * std::numbers::pi - 6), 1e-12);
-  EXPECT_NEAR(odometry.MoveTo(9)->way_m.norm(), 3, 1e-12);  // after the last one: there
-  EXPECT_NEAR(odometry.MoveTo(0)->way_m.norm(), 0, 1e-12);  // now
+  EXPECT_NEAR(odometry.MoveTo(3.4)->way_m.norm(), 3, 1e-12);  // a little after the last one: there
+  EXPECT_NEAR(odometry.MoveTo(0)->way_m.norm(), 0, 1e-12);    // now
+  EXPECT_FALSE(odometry.MoveTo(3.6));  // odometry that has ended does not say that the robot stands
+  EXPECT_FALSE(odometry.MoveTo(3));    // nor from where it drove meanwhile
+  EXPECT_TRUE(odometry.MoveTo(3.1));
 }
 
 TEST(Odometry, BeginsAnewWhereTimeGoesBackAndRefusesWhatIsNotFinite) {
@@ -167,7 +170,8 @@ TEST(Odometry, BeginsAnewWhereTimeGoesBackAndRefusesWhatIsNotFinite) {
   EXPECT_EQ(odometry.Add(2, {{nan, 0}, 0}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_FALSE(odometry.Add(2, {{0, 0}, nan}).ok());
   EXPECT_FALSE(odometry.Add(nan, {{0, 0}, 0}).ok());
-  EXPECT_NEAR(odometry.MoveTo(2)->way_m.x(), 0, 1e-12);
+  ASSERT_TRUE(odometry.MoveTo(1.4));
+  EXPECT_NEAR(odometry.MoveTo(1.4)->way_m.x(), 0, 1e-12);
 }
 
 }  // namespace
