@@ -11,7 +11,7 @@ namespace {
 // Odometry of 1000 Hz for 4 s: of an image that took longer on its way nothing is known.
 constexpr size_t kMaxNumPoses = 4000;
 // Odometry that has ended says no more that the robot stands.
-constexpr double kMaxAgeS = 0.5;
+constexpr double kMaxAgeS = 1;
 
 PlanarPose Compose(const PlanarPose& a, const PlanarPose& b) {
   return {a.FloorFromRobot(b.position), WrapAngle(a.heading_rad + b.heading_rad)};

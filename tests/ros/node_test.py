@@ -394,6 +394,7 @@ class Node(unittest.TestCase):
         num_answers = len(robot.said["places"])
         robot.show(picture, 0.3)  # before the period is over
         self.assertEqual(len(robot.said["places"]), num_answers)
+        drive(5, 5, numpy.pi / 2)  # it stands, and says so: from odometry that has ended nothing would be known
         robot.show(picture, 1)
         self.assertEqual(where()[0], "r0")
         drive(5, 6.2, numpy.pi / 2)  # 120 cm ahead, in the frame of odometry along y

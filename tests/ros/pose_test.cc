@@ -153,7 +153,7 @@ TEST(Odometry, TakesTheImagesTimeBetweenTwoPoses) {
   EXPECT_NEAR(move->turn_left_rad, 0.25 * (2 * std::numbers::pi - 6), 1e-12);
   EXPECT_NEAR(odometry.MoveTo(3.4)->way_m.norm(), 3, 1e-12);  // a little after the last one: there
   EXPECT_NEAR(odometry.MoveTo(0)->way_m.norm(), 0, 1e-12);    // now
-  EXPECT_FALSE(odometry.MoveTo(3.6));  // odometry that has ended does not say that the robot stands
+  EXPECT_FALSE(odometry.MoveTo(4.1));  // odometry that has ended does not say that the robot stands
   EXPECT_FALSE(odometry.MoveTo(3));    // nor from where it drove meanwhile
   EXPECT_TRUE(odometry.MoveTo(3.1));
 }
