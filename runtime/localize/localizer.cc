@@ -68,8 +68,8 @@ bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspon
 bool HasPlaces(const Localization& found) { return found.has_fix() || !found.possible_poses.empty(); }
 
 // The better of two answers, found among other landmarks.  Of two that say nothing the one that came farther
-// says more.  A fix at one of the places of an ambiguous answer, with as many matches, does not decide for
-// it: the other place's landmarks may not be among those of the fix.
+// says more.  A fix at one of the places of an ambiguous answer does not decide for it, as the other place's
+// landmarks may not be among those of the fix; unless it was found among all.
 Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
   if (!HasPlaces(first) && !HasPlaces(second)) {
     const bool is_better =
@@ -78,6 +78,7 @@ Localization Better(Localization first, Localization second, const AcceptOptions
   }
   if (!HasPlaces(first)) return second;
   if (!HasPlaces(second)) return first;
+  if (!first.has_fix() && second.has_fix() && second.scope == Scope::kAll) return second;
   return DecideAmong({first, second}, 1, accept);
 }
 
