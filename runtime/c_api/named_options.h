@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <initializer_list>
 
 #include "core/features/sift.h"
 #include "core/options/options.h"
@@ -17,6 +18,12 @@
 // the shared library exports none of this.
 namespace cairn {
 
+inline OptionTable JoinTables(std::initializer_list<OptionTable> tables) {
+  OptionTable all;
+  for (const OptionTable& table : tables) all.insert(all.end(), table.begin(), table.end());
+  return all;
+}
+
 // All options that a look reads, and no others.
 struct LookOptions {
   PlaceModelOptions model;
@@ -24,10 +31,8 @@ struct LookOptions {
   RerankOptions closer;
 };
 inline OptionTable DescribeOptions(LookOptions* options) {
-  OptionTable all = DescribeOptions(&options->model);
-  for (const OptionTable& part : {DescribeOptions(&options->sift), DescribeOptions(&options->closer)})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
+  return JoinTables(
+      {DescribeOptions(&options->model), DescribeOptions(&options->sift), DescribeOptions(&options->closer)});
 }
 // All options of a place belief and of the localizer that it looks with.
 struct BeliefOptions {
@@ -35,9 +40,7 @@ struct BeliefOptions {
   PlaceBeliefOptions belief;
 };
 inline OptionTable DescribeOptions(BeliefOptions* options) {
-  OptionTable all = DescribeOptions(&options->belief);
-  for (const Option& option : DescribeOptions(&options->localizer)) all.push_back(option);
-  return all;
+  return JoinTables({DescribeOptions(&options->belief), DescribeOptions(&options->localizer)});
 }
 inline constexpr const char* kBeliefOptionsHelp = "`cairn where --help-all` lists them";
 
@@ -47,9 +50,7 @@ struct AtlasSearchOptions {
   AtlasLocalizerOptions atlas;
 };
 inline OptionTable DescribeOptions(AtlasSearchOptions* options) {
-  OptionTable all = DescribeOptions(&options->atlas);
-  for (const Option& option : DescribeOptions(&options->localizer)) all.push_back(option);
-  return all;
+  return JoinTables({DescribeOptions(&options->atlas), DescribeOptions(&options->localizer)});
 }
 
 struct SpaceTrackerOptions {
@@ -58,13 +59,8 @@ struct SpaceTrackerOptions {
   SureTrackerOptions sure;
 };
 inline OptionTable DescribeOptions(SpaceTrackerOptions* options) {
-  OptionTable all = DescribeOptions(&options->localizer);
-  for (const OptionTable& part :
-       {DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes),
-        DescribeOptions(&options->sure)}) {
-    all.insert(all.end(), part.begin(), part.end());
-  }
-  return all;
+  return JoinTables({DescribeOptions(&options->localizer), DescribeOptions(&options->tracker),
+                     DescribeOptions(&options->tracker.votes), DescribeOptions(&options->sure)});
 }
 
 struct FloorTrackerOptions {
@@ -75,15 +71,10 @@ struct FloorTrackerOptions {
   VisualEstimateOptions estimate;
 };
 inline OptionTable DescribeOptions(FloorTrackerOptions* options) {
-  OptionTable all;
-  for (const OptionTable& part :
-       {DescribeOptions(&options->features.sift), DescribeOptions(&options->features.measurement),
-        DescribeOptions(&options->map), DescribeOptions(&options->tracker),
-        DescribeOptions(&options->tracker.votes), DescribeOptions(&options->filter),
-        DescribeOptions(&options->estimate)}) {
-    all.insert(all.end(), part.begin(), part.end());
-  }
-  return all;
+  return JoinTables({DescribeOptions(&options->features.sift),
+                     DescribeOptions(&options->features.measurement), DescribeOptions(&options->map),
+                     DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes),
+                     DescribeOptions(&options->filter), DescribeOptions(&options->estimate)});
 }
 
 // For a name that is near to none.

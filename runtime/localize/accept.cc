@@ -37,6 +37,40 @@ std::vector<Explanation> ExplanationsOf(const Localization& found) {
   return several;
 }
 
+// The places that explain an image, each by what it has most matches for, that with most first; without those
+// that a fix is a thousand times likelier than.
+std::vector<Explanation> PlacesOf(const std::vector<Localization>& found, const AcceptOptions& accept) {
+  std::vector<Explanation> places;
+  for (const Localization& each : found) {
+    for (const Explanation& explanation : ExplanationsOf(each)) places.push_back(explanation);
+  }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const auto& a, const auto& b) { return a.num_matches > b.num_matches; });
+  // Of a place the one with most matches.
+  for (size_t i = 0; i < places.size(); ++i) {
+    const auto is_here = [&](const Explanation& other) {
+      return !AreFarApart(places[i].cam_from_world, other.cam_from_world, accept);
+    };
+    const auto others = places.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+    if (places[i].fix == nullptr) {  // a fix knows its place better
+      const auto fix = std::find_if(others, places.end(), [&](const Explanation& other) {
+        return other.fix != nullptr && is_here(other);
+      });
+      if (fix != places.end()) {
+        places[i].fix = fix->fix;
+        places[i].odds = fix->odds;
+      }
+    }
+    places.erase(std::remove_if(others, places.end(), is_here), places.end());
+  }
+  const Explanation likeliest = *std::max_element(
+      places.begin(), places.end(), [](const auto& a, const auto& b) { return a.odds < b.odds; });
+  constexpr double kHopeless = 1e-3;
+  if (likeliest.fix != nullptr)
+    std::erase_if(places, [&](const Explanation& place) { return place.odds < kHopeless * likeliest.odds; });
+  return places;
+}
+
 int NumCells(const Query& query, const std::vector<Correspondence>& inliers, int grid) {
   std::set<std::pair<int, int>> cells;
   for (const Correspondence& inlier : inliers) {
@@ -253,34 +287,7 @@ Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::
 
 Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
                          const AcceptOptions& accept) {
-  std::vector<Explanation> places;
-  for (const Localization& each : found) {
-    for (const Explanation& explanation : ExplanationsOf(each)) places.push_back(explanation);
-  }
-  std::stable_sort(places.begin(), places.end(),
-                   [](const auto& a, const auto& b) { return a.num_matches > b.num_matches; });
-  // Of a place the one with most matches.
-  for (size_t i = 0; i < places.size(); ++i) {
-    const auto is_here = [&](const Explanation& other) {
-      return !AreFarApart(places[i].cam_from_world, other.cam_from_world, accept);
-    };
-    const auto others = places.begin() + static_cast<std::ptrdiff_t>(i) + 1;
-    if (places[i].fix == nullptr) {  // a fix knows its place better
-      const auto fix = std::find_if(others, places.end(), [&](const Explanation& other) {
-        return other.fix != nullptr && is_here(other);
-      });
-      if (fix != places.end()) {
-        places[i].fix = fix->fix;
-        places[i].odds = fix->odds;
-      }
-    }
-    places.erase(std::remove_if(others, places.end(), is_here), places.end());
-  }
-  const Explanation likeliest = *std::max_element(
-      places.begin(), places.end(), [](const auto& a, const auto& b) { return a.odds < b.odds; });
-  constexpr double kHopeless = 1e-3;
-  if (likeliest.fix != nullptr)
-    std::erase_if(places, [&](const Explanation& place) { return place.odds < kHopeless * likeliest.odds; });
+  const std::vector<Explanation> places = PlacesOf(found, accept);
   const Explanation& best = places.front();
   double odds_of_all = 0;
   for (const Explanation& place : places) odds_of_all += place.odds;

@@ -239,7 +239,7 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
       const auto near,
       RetrieveByPrior(*map_, {given_from_camera * best.cam_from_world, 0, 0}, options_.retrieve));
   const NodeIdx node = near.empty() ? -1 : appearance->node_of_image[near[0].image];
-  if (node < 0) return best;
+  if (node < 0 || appearance->look_alikes[node].empty()) return best;
   std::vector<int32_t> possible;  // by the prior
   if (prior) {
     RetrieveOptions retrieve = options_.retrieve;
@@ -248,7 +248,6 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     possible = ImagesOf(candidates);
     std::sort(possible.begin(), possible.end());
   }
-  if (appearance->look_alikes[node].empty()) return best;
   // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
   // are among them, no match is much better than the next best.
   const auto try_at = [&](const std::vector<Candidate>& images) -> Result<Localization> {

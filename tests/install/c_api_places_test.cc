@@ -14,6 +14,7 @@
 #include "runtime/drive/start_hypotheses.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
+#include "tests/install/c_image.h"
 #include "tests/install/poster_wings.h"
 
 namespace cairn {
@@ -25,15 +26,6 @@ using testing::HasSubstr;
 const PosterWings& Wings() {
   static const PosterWings wings;
   return wings;
-}
-
-cairn_image ImageOf(const cv::Mat& picture) {
-  cairn_image image = CAIRN_IMAGE_INIT;
-  image.pixels = picture.data;
-  image.width = picture.cols;
-  image.height = picture.rows;
-  image.stride = picture.step;
-  return image;
 }
 
 // The map of two wings, in C and in C++.  It is closed in C before a test uses what was made of it, unless

@@ -6,6 +6,7 @@
 
 #include "runtime/c_api/cairn.h"
 #include "runtime/drive/image_servo.h"
+#include "tests/install/c_image.h"
 #include "tests/install/poster_room.h"
 
 namespace cairn {
@@ -16,15 +17,6 @@ using testing::HasSubstr;
 const PosterRoom& Room() {
   static const PosterRoom room;
   return room;
-}
-
-cairn_image ImageOf(const cv::Mat& picture) {
-  cairn_image image = CAIRN_IMAGE_INIT;
-  image.pixels = picture.data;
-  image.width = picture.cols;
-  image.height = picture.rows;
-  image.stride = picture.step;
-  return image;
 }
 
 // On the way to r2: frames come nearer, 20 cm each, from 80 cm behind it.

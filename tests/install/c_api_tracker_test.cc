@@ -17,6 +17,7 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 #include "runtime/visual_map/visual_tracker.h"
+#include "tests/install/c_image.h"
 #include "tests/install/poster_drive.h"
 
 namespace cairn {
@@ -32,15 +33,6 @@ const PosterDrive& Drive() {
 const cv::Mat& Blank() {
   static const cv::Mat blank(240, 320, CV_8UC1, cv::Scalar(90));
   return blank;
-}
-
-cairn_image ImageOf(const cv::Mat& picture) {
-  cairn_image image = CAIRN_IMAGE_INIT;
-  image.pixels = picture.data;
-  image.width = picture.cols;
-  image.height = picture.rows;
-  image.stride = picture.step;
-  return image;
 }
 
 void ExpectSamePose(const double (&rotation_wxyz)[4], const double (&translation_m)[3], const Pose& pose) {

@@ -5,16 +5,10 @@
 set -eu
 poster=$1
 shift
-first=
+. "$(dirname "$0")/agree.sh"
 for program; do
   said=$("$program" "$poster/wings.cairn" h1 "$poster"/wing[0-5].pgm)
-  if [ -z "$first" ]; then
-    first=$said
-    echo "$said"
-  elif [ "$said" != "$first" ]; then
-    echo "$program says something else: $said" >&2
-    exit 1
-  fi
+  agree "$program" "$said"
 done
 
 # Before the third picture both wings are likely; then it is wing b, and stays so.

@@ -5,17 +5,11 @@
 set -eu
 poster=$1
 shift
-first=
+. "$(dirname "$0")/agree.sh"
 for program; do
   said=$("$program" "$poster/room.cairn" r2 "$poster/room0.pgm" "$poster/room4.pgm" "$poster/room8.pgm" "$poster/blank.pgm" "$poster/room10.pgm" \
     "$poster/room16.pgm" "$poster/room0.pgm")
-  if [ -z "$first" ]; then
-    first=$said
-    echo "$said"
-  elif [ "$said" != "$first" ]; then
-    echo "$program says something else: $said" >&2
-    exit 1
-  fi
+  agree "$program" "$said"
 done
 echo "$first" | awk '
   NR != 4 && NR < 6 && ($1 != "approaching" || $2 <= 0 || $6 < 40) { print "it does not come nearer: " $0; bad = 1 }
