@@ -143,10 +143,9 @@ class LocalizerNode {
     verdicts_ = node.advertise<std_msgs::String>("verdict", 10);
     next_ = node.advertise<std_msgs::String>("next", 1, true);
     if (parameters_.steer) velocity_ = std::make_unique<Velocity>(parameters_.stop_after_s);
-    if (parameters_.where) {
-      places_ = node.advertise<sensor_msgs::PointCloud>("places", 1);
+    if (parameters_.where) places_ = node.advertise<sensor_msgs::PointCloud>("places", 1);
+    if (parameters_.where || parameters_.follow)
       odometry_ = node.subscribe("odom", 1000, &LocalizerNode::OnOdometry, this);
-    }
     goals_ = node.subscribe("goal", 1, &LocalizerNode::OnGoal, this);
     progress_ = node.subscribe("progress", 10, &LocalizerNode::OnProgress, this);
     // Only the newest image: queued ones would be old.
@@ -290,6 +289,7 @@ class LocalizerNode {
                      KeyValue("features", answer.num_features),
                      KeyValue("inliers", answer.num_inliers),
                      KeyValue("region", answer.region),
+                     KeyValue("scope", answer.scope),
                      KeyValue("probability", answer.probability),
                      KeyValue("library_ms", answer.library_ms),
                      KeyValue("node_ms", node_ms),

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ros/grey_pixels.h"
+#include "ros/odometry.h"
 #include "ros/robot_pose.h"
 #include "ros/start_finder.h"
 #include "ros/steerer.h"
@@ -58,6 +59,7 @@ struct MapLocalizer::State {
         robot_from_camera(mounting),
         localizer(map),
         tracker(map),
+        odometry(mounting),
         starts(map, mounting, parameters.steer) {}
 
   Parameters parameters;
@@ -65,6 +67,7 @@ struct MapLocalizer::State {
   Pose robot_from_camera;
   Localizer localizer;
   RegionTracker tracker;
+  Odometry odometry;  // of the images that the tracker sees
   StartFinder starts;
   std::shared_ptr<SharedLog> log;          // null: none
   std::optional<Steerer> steerer;          // with Parameters::steer
@@ -149,6 +152,9 @@ struct MapLocalizer::State {
   Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places) {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
+    const std::optional<FloorMotion> moved = odometry.MoveTo(image.stamp_s);
+    if (parameters.follow && moved && IsMetric(map->head().frame))
+      CAIRN_RETURN_IF_ERROR(tracker.Move(moved->way_m, moved->turn_left_rad));
     const auto begin = std::chrono::steady_clock::now();
     Result<Localization> found = log || whereabouts  ? LocateByFeatures(grey, camera, image.stamp_s, places)
                                  : parameters.follow ? tracker.Track(grey, camera)
@@ -215,6 +221,7 @@ Answer MapLocalizer::Locate(const Image& image) {
   answer.num_features = found->num_features;
   answer.num_inliers = found->num_inliers;
   answer.region = found->region;
+  answer.scope = ScopeName(found->scope);
   answer.probability = found->probability;
   if (!answer.has_fix) return answer;
   const RobotPose pose = RobotPoseOf(*found, state_->robot_from_camera);
@@ -272,7 +279,9 @@ Steered MapLocalizer::Steer(const Image& image) {
 }
 
 bool MapLocalizer::AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad) {
-  return !state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, {{x_m, y_m}, heading_rad}).ok();
+  const PlanarPose pose{{x_m, y_m}, heading_rad};
+  return state_->odometry.Add(stamp_s, pose).ok() &&
+         (!state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, pose).ok());
 }
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }

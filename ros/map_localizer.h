@@ -71,6 +71,7 @@ struct Answer {
   double orientation_xyzw[4] = {0, 0, 0, 1};
   double covariance[36] = {0};  // x, y, z, rotation about the map's x, y, z
   int num_features = 0, num_inliers = 0, region = -1;
+  std::string scope;             // among which landmarks it was found
   double probability = 0;        // that the fix is right
   double library_ms = 0;         // in the runtime: the rest is the node's
   std::optional<Places> places;  // of an image by which whereabouts were looked for

@@ -19,12 +19,6 @@ PlanarPose Compose(const PlanarPose& a, const PlanarPose& b) {
 
 }  // namespace
 
-PlanarPose CameraOnFloor(const Pose& robot_from_camera) {
-  const Eigen::Vector3d axis = robot_from_camera.rotation * Eigen::Vector3d::UnitZ();
-  const bool has_heading = axis.head<2>().norm() > 1e-3;
-  return {robot_from_camera.translation.head<2>(), has_heading ? std::atan2(axis.y(), axis.x()) : 0};
-}
-
 Status Odometry::Add(double time_s, const PlanarPose& odom_from_robot) {
   if (!std::isfinite(time_s) || !odom_from_robot.position.allFinite() ||
       !std::isfinite(odom_from_robot.heading_rad))
@@ -54,7 +48,7 @@ std::optional<PlanarPose> Odometry::At(double time_s) const {
                     WrapAngle(from.heading_rad + share * WrapAngle(to.heading_rad - from.heading_rad))};
 }
 
-std::optional<CameraMove> Odometry::MoveTo(double image_time_s) {
+std::optional<FloorMotion> Odometry::MoveTo(double image_time_s) {
   const std::optional<PlanarPose> robot = At(image_time_s);
   if (!robot) {
     last_.reset();
@@ -63,8 +57,8 @@ std::optional<CameraMove> Odometry::MoveTo(double image_time_s) {
   const PlanarPose camera = Compose(*robot, robot_from_camera_);
   const std::optional<PlanarPose> before = std::exchange(last_, camera);
   if (!before) return std::nullopt;
-  return CameraMove{before->RobotFromFloor(camera.position),
-                    WrapAngle(camera.heading_rad - before->heading_rad)};
+  return FloorMotion{before->RobotFromFloor(camera.position),
+                     WrapAngle(camera.heading_rad - before->heading_rad)};
 }
 
 }  // namespace cairn

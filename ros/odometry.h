@@ -8,18 +8,9 @@
 #include "core/base/error.h"
 #include "core/geometry/planar_pose.h"
 #include "core/geometry/pose.h"
+#include "runtime/track/camera_motion.h"
 
 namespace cairn {
-
-// Where a mounted camera is on the floor, in its robot's frame, and to where it looks: along its optical
-// axis, z; one that looks up or down has the robot's heading.
-PlanarPose CameraOnFloor(const Pose& robot_from_camera);
-
-// How a camera moved over the floor, in its frame at the beginning.
-struct CameraMove {
-  Eigen::Vector2d way_m = Eigen::Vector2d::Zero();  // ahead, to the left
-  double turn_left_rad = 0;
-};
 
 // Where odometry has a robot, and how its camera moved from image to image.
 class Odometry {
@@ -31,7 +22,7 @@ class Odometry {
   Status Add(double time_s, const PlanarPose& odom_from_robot);
   // Since the image of the call before; nothing where either has no odometry.  Between two poses on the
   // straight way from one to the other; after the last one: there.  Time 0: now.
-  std::optional<CameraMove> MoveTo(double image_time_s);
+  std::optional<FloorMotion> MoveTo(double image_time_s);
 
  private:
   struct TimedPose {

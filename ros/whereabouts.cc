@@ -53,7 +53,7 @@ Places Whereabouts::See(const Query& query, const Localization& found, double im
 
 Result<Places> Whereabouts::Update(const Query& query, const Localization& found, double image_time_s,
                                    double seconds) {
-  const std::optional<CameraMove> move = odometry_.MoveTo(image_time_s);
+  const std::optional<FloorMotion> move = odometry_.MoveTo(image_time_s);
   if (move && IsMetric(map_->head().frame))
     CAIRN_RETURN_IF_ERROR(belief_.Move(move->way_m, move->turn_left_rad));
   CAIRN_RETURN_IF_ERROR(belief_.Elapse(seconds));

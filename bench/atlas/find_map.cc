@@ -119,7 +119,7 @@ Status Run(int argc, char** argv) {
   if (argc < 3)
     return MakeError(ErrorCode::kInvalidArgument, "usage: find_map ATLAS NAME=CAPTURE... [none=FOLDER...]");
   cv::setNumThreads(1);
-  CAIRN_ASSIGN_OR_RETURN(const auto atlas, Atlas::Open(argv[1], {.max_num_open_maps = 8}));
+  CAIRN_ASSIGN_OR_RETURN(const auto atlas, Atlas::Open(argv[1]));
   std::printf("%-20s %6s %6s %6s %9s %6s %6s %6s %6s %6s %9s %6s %6s\n", "map", "images", "first", "in 3",
               "localized", "alone", "wrong", ">=0.9", ">=0.99", "shared", "SIFT, ms", "index", "answer");
   Figures known, unknown;

@@ -52,14 +52,14 @@ def ahead_of(pose):
     return math.atan2(2 * (y * z + w * x), 2 * (x * z - w * y))
 
 
-def driven(before, after, generator):
+def driven(before, after, generator, noise=0.05):
     """Metres ahead and to the left, degrees to the left, with noise."""
     way = [b - a for a, b in zip(center(before), center(after))]
     heading = ahead_of(before)
     ahead = way[0] * math.cos(heading) + way[1] * math.sin(heading)
     left = way[1] * math.cos(heading) - way[0] * math.sin(heading)
     turn = math.degrees(math.remainder(ahead_of(after) - heading, 2 * math.pi))
-    return [value * (1 + generator.gauss(0, 0.05)) for value in (ahead, left, turn)]
+    return [value * (1 + generator.gauss(0, noise)) for value in (ahead, left, turn)]
 
 
 def places_of(cairn, map_path, images, odometry=()):

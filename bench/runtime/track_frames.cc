@@ -14,7 +14,7 @@
 
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 
 namespace cairn {
 namespace {

@@ -16,7 +16,7 @@ struct FloorPose {
 
 inline double AngleBetweenDeg(double a, double b) { return std::abs(std::remainder(a - b, 360.0)); }
 
-// The heading of a camera that looks straight up or down is the direction of its image's top.
+// The heading of a camera that looks up or down, within 15 degrees, is the direction of its image's top.
 FloorPose FloorPoseOf(const Pose& cam_from_world, const Pose& floor_from_world);
 
 }  // namespace cairn

@@ -58,7 +58,7 @@ Result<std::optional<SeenImage>> SeenIn(const Map& map, int32_t image_idx) {
 Result<std::optional<int32_t>> PlaceIn(const std::shared_ptr<const Map>& map, const SeenImage& seen) {
   Localizer localizer(map);
   CAIRN_ASSIGN_OR_RETURN(const Localization found, localizer.LocalizeFeatures(seen.features, seen.camera));
-  if (!found.has_fix() && found.possible_poses.empty()) return std::optional<int32_t>();
+  if (!found.has_places()) return std::optional<int32_t>();
   CAIRN_ASSIGN_OR_RETURN(const int32_t image, ImageNearFix(*map, found));
   return std::optional(image);
 }

@@ -9,16 +9,20 @@ nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
       {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
 }
 
+nlohmann::ordered_json PoseJson(const Pose& cam_from_world, const Matrix6d& covariance) {
+  const Eigen::Quaterniond& q = cam_from_world.rotation;
+  const Eigen::Vector3d& t = cam_from_world.translation;
+  const Eigen::Vector3d center = cam_from_world.Center();
+  return {{"rotation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
+          {"translation_m", {t.x(), t.y(), t.z()}},
+          {"center_m", {center.x(), center.y(), center.z()}},
+          {"covariance", std::vector<double>(covariance.data(), covariance.data() + 36)}};
+}
+
 nlohmann::ordered_json LocalizationJson(const Localization& found) {
   nlohmann::ordered_json json = {{"fix", found.has_fix()}};
   if (found.has_fix()) {
-    const Eigen::Quaterniond& q = found.cam_from_world.rotation;
-    const Eigen::Vector3d& t = found.cam_from_world.translation;
-    const Eigen::Vector3d center = found.cam_from_world.Center();
-    json["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
-    json["translation_m"] = {t.x(), t.y(), t.z()};
-    json["center_m"] = {center.x(), center.y(), center.z()};
-    json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
+    json.update(PoseJson(found.cam_from_world, found.covariance));
     json["probability"] = found.probability;
     json["region"] = found.region;
   } else {

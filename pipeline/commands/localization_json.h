@@ -9,6 +9,9 @@
 
 namespace cairn::pipeline {
 
+// Of a cam_from_world: its rotation and translation, where the camera stands, and the covariance.
+nlohmann::ordered_json PoseJson(const Pose& cam_from_world, const Matrix6d& covariance);
+
 // What `cairn localize` says of a fix, or of the reason for none.
 nlohmann::ordered_json LocalizationJson(const Localization& found);
 

@@ -25,30 +25,21 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
     CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_map), DescribeOptions(&of_estimate),
                                   DescribeOptions(&of_visual_tracker), DescribeOptions(&of_filter)},
                                  "is for --estimator visual-map or both; give one of them, or leave it out"));
-    if (!arguments.odometry_path.empty() && arguments.sure_options.min_place_probability == 0)
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "--odometry is for --estimator visual-map or both, or for --min-place-probability; give "
-          "one of them, or leave it out");
   }
   if (arguments.odometry_path.empty()) {
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"place_way_sigma_ratio", "place_turn_sigma_ratio", "place_way_sigma_m", "place_turn_sigma_deg"},
-        "is the error of odometry; give --odometry, or leave it out"));
+    WheelErrorOptions of_wheels;
+    std::vector<std::string> names = NamesOf(DescribeOptions(&of_wheels));
+    names.insert(names.end(), {"min_prior_sigma_m", "min_prior_sigma_deg", "place_way_sigma_ratio",
+                               "place_turn_sigma_ratio", "place_way_sigma_m", "place_turn_sigma_deg"});
+    CAIRN_RETURN_IF_ERROR(
+        arguments.option_arguments.RefuseGiven(names, "is for odometry; give --odometry, or leave it out"));
   } else {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"place_reach_links"}, "is for images without odometry; leave it out"));
   }
-  if (arguments.sure_options.min_place_probability == 0) {
-    SureTrackerOptions of_sure;
-    std::vector<std::string> names = NamesOf(DescribeOptions(&of_sure));
-    std::erase(names, "min_place_probability");
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        names, "is for --min-place-probability; give it, 0.9 say, or leave this out"));
-    if (arguments.period_s > 0)
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "--period is for --min-place-probability; give it, 0.9 say, or leave this out");
-  }
+  if (arguments.sure_options.min_place_probability == 0 && arguments.period_s > 0)
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--period is for --min-place-probability; give it, 0.9 say, or leave this out");
   if (!arguments.is_sequence) {
     SureTrackerOptions of_sure;
     CAIRN_RETURN_IF_ERROR(
@@ -67,7 +58,7 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   }
   return arguments.odometry_path.empty()
              ? arguments.option_arguments.RefuseGiven(
-                   {"odometry_way_ratio", "odometry_turn_ratio", "odometry_sigma_m", "odometry_sigma_deg"},
+                   {"wheel_way_ratio", "wheel_turn_ratio", "odometry_sigma_m", "odometry_sigma_deg"},
                    "is the error of odometry; give --odometry, or leave it out")
              : arguments.option_arguments.RefuseGiven({"unknown_way_sigma_m", "unknown_turn_sigma_deg"},
                                                       "is for frames without odometry; leave it out");

@@ -36,6 +36,7 @@ struct Answer {
   Result<Localization> localization = Error{};
   std::optional<Result<TrackedVisualPose>> visual;
   std::optional<Disagreement> disagreement;  // where both have a fix
+  std::optional<UncertainPose> believed;     // without a fix: where odometry has the camera
   std::optional<Query> query;                // where frames are logged
 };
 
@@ -73,9 +74,15 @@ struct Trackers {
     if (believes && period_s > 0) CAIRN_RETURN_IF_ERROR(in_space->Elapse(period_s));
     if (!odometry) return Ok();
     return odometry->MoveToNext(image, [&](const Eigen::Vector2d& way_m, double turn_left_rad) -> Status {
-      if (believes) CAIRN_RETURN_IF_ERROR(in_space->Move(way_m, turn_left_rad));
+      if (in_space) CAIRN_RETURN_IF_ERROR(in_space->Move(way_m, turn_left_rad));
       return on_floor ? on_floor->Move(way_m, turn_left_rad) : Ok();
     });
+  }
+
+  // Where odometry has a camera that was not found.
+  std::optional<UncertainPose> Believed(const Result<Localization>& found) const {
+    const bool has_fix = found.ok() && found->has_fix();
+    return odometry && in_space && !has_fix ? in_space->Believed() : std::nullopt;
   }
 };
 
@@ -102,6 +109,7 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
     return TrackedVisualPose{std::move(pose)};
   };
   answer.visual = locate();
+  answer.believed = trackers->Believed(answer.localization);
   if (!answer.visual->ok()) {
     answer.localization = answer.visual->error();
   } else if (arguments.estimator == "visual-map") {
@@ -142,13 +150,18 @@ Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& ma
     CAIRN_ASSIGN_OR_RETURN(answer.query, Localizer(map, arguments.options).QueryFromImage(grey, camera));
     return tracker->TrackFeatures(answer.query->features, camera);
   }();
+  answer.believed = trackers->Believed(answer.localization);
   return answer;
 }
 
 nlohmann::ordered_json PnpJson(const Answer& answer) {
-  if (!answer.localization.ok()) return ErrorJson(answer.image, answer.localization.error());
   nlohmann::ordered_json json = {{"image", answer.image}};
-  json.update(LocalizationJson(*answer.localization));
+  if (answer.localization.ok()) {
+    json.update(LocalizationJson(*answer.localization));
+  } else {
+    json = ErrorJson(answer.image, answer.localization.error());
+  }
+  if (answer.believed) json["believed"] = PoseJson(answer.believed->pose, answer.believed->covariance);
   return json;
 }
 
@@ -285,10 +298,9 @@ Command LocalizeCommand() {
                            "The images are frames in order: follow the camera from one to the next");
             parser
                 .Add("--odometry", arguments->odometry_path,
-                     "With --sequence, and a visual map or --min-place-probability: a line for each image, "
-                     "how "
-                     "the robot drove since the one before: metres ahead, metres to the left, degrees turned "
-                     "to the left")
+                     "With --sequence: a line for each image, how the camera moved over the floor since the "
+                     "one before: metres ahead, metres to the left, degrees turned to the left; frames "
+                     "without a fix then say where it is by that (believed)")
                 .Type("FILE");
             parser
                 .Add("--period", arguments->period_s,

@@ -22,6 +22,17 @@ struct Atlas::Store {
     }
   }
 
+  // Those that were asked for longest ago.
+  void CloseForOneMore() {
+    int64_t num_bytes = 0;
+    for (const auto& [map, opened] : open) num_bytes += opened->num_kept_bytes();
+    while (!open.empty() && (open.size() >= static_cast<size_t>(options.max_num_open_maps) ||
+                             num_bytes > options.memory_budget_bytes)) {
+      num_bytes -= open.back().second->num_kept_bytes();
+      open.pop_back();
+    }
+  }
+
   AtlasRows rows;
   std::string path;
   AtlasOptions options;
@@ -43,6 +54,10 @@ Result<std::shared_ptr<const Atlas>> Atlas::Open(const std::string& path, const 
     if (options.max_num_open_maps < 1) {
       return MakeError(ErrorCode::kInvalidArgument, "max_num_open_maps: {}, must be 1 or more",
                        options.max_num_open_maps);
+    }
+    if (options.memory_budget_bytes <= 0) {
+      return MakeError(ErrorCode::kInvalidArgument, "memory_budget_bytes: {}, must be positive",
+                       options.memory_budget_bytes);
     }
     CAIRN_ASSIGN_OR_RETURN(AtlasRows rows, ReadAtlas(path, options.public_key));
     if (!options.name.empty() && rows.name != options.name) {
@@ -90,8 +105,8 @@ Result<std::shared_ptr<const Map>> Atlas::OpenMap(int map) const {
           "the atlas anew",
           path, store_->path, row.name);
     }
+    store_->CloseForOneMore();
     open.emplace_front(map, std::move(opened));
-    if (open.size() > static_cast<size_t>(store_->options.max_num_open_maps)) open.pop_back();
     return open.front().second;
   });
 }

@@ -17,10 +17,11 @@ struct Features;   // core/features/features.h
 struct MapScore;   // runtime/atlas/code_index.h
 
 struct AtlasOptions {
-  // Largest size of the loaded parts of each open map (MapOptions::memory_budget_bytes).
-  int64_t memory_budget_bytes = int64_t{64} << 20;
-  // Most maps that are kept open for later queries: those asked for last.  REQUIRES: >= 1
-  int max_num_open_maps = 4;
+  // Size of the loaded parts of all maps that are kept open for later queries: those asked for last.  The one
+  // in use may add as much (MapOptions::memory_budget_bytes).  REQUIRES: > 0
+  int64_t memory_budget_bytes = int64_t{128} << 20;
+  // Most maps that are kept open, each a file.  REQUIRES: >= 1
+  int max_num_open_maps = 128;
   // An atlas without a signature of this key is refused.  Its maps need none: the atlas states their hashes.
   std::optional<PublicKey> public_key;
   // Required name of the atlas (empty: any) and its smallest epoch (0: any).

@@ -123,7 +123,7 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
       answer.maps_tried.push_back(now.map);
       Localizer localizer(map, localizer_options_);
       CAIRN_ASSIGN_OR_RETURN(Localization found, localizer.LocalizeFeatures(features, *own));
-      if (found.probability <= 0 || (!found.has_fix() && found.possible_poses.empty())) {
+      if (found.probability <= 0 || !found.has_places()) {
         if (answer.maps_tried.size() == 1) answer.best_failure = std::move(found);
         continue;
       }

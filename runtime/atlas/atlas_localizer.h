@@ -17,9 +17,10 @@
 namespace cairn {
 
 struct AtlasLocalizerOptions {
-  // Most maps in which an image is localized, those with most evidence first.  Maps of which a place is known
-  // that looks like the one found come on top.  REQUIRES: >= 1
-  int max_num_maps = 16;
+  // Most maps in which an image is localized, those with most evidence first, until one is sure: an image of
+  // none of them takes as many localizations.  Maps of which a place is known that looks like the one found
+  // come on top.  REQUIRES: >= 1
+  int max_num_maps = 128;
   // Once a map has a fix of this probability, only those are asked that have at least `rival_ratio` of the
   // image's features that it has.  REQUIRES: both in [0, 1]
   double sure_probability = 0.99;

@@ -188,6 +188,19 @@ typedef struct cairn_prior {
 #define CAIRN_PRIOR_INIT \
   { sizeof(cairn_prior), {1, 0, 0, 0}, {0, 0, 0}, 1, 10 }
 
+/* A pose and how well it is known: a camera's cam_from_world, or how it moved from a frame to the next. */
+typedef struct cairn_uncertain_pose {
+  size_t size;
+  double rotation_wxyz[4]; /* a unit quaternion */
+  double translation_m[3];
+  /* 6 x 6: rotation (rad), translation (m), of the left perturbation. */
+  double covariance[36];
+} cairn_uncertain_pose;
+#define CAIRN_UNCERTAIN_POSE_INIT                                \
+  {                                                              \
+    sizeof(cairn_uncertain_pose), {1, 0, 0, 0}, {0, 0, 0}, { 0 } \
+  }
+
 /* A fix, or the reason for none. */
 typedef struct cairn_fix {
   size_t size;
@@ -340,10 +353,10 @@ CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cair
  * again, as if the frame were the first, when it is not there: fix->scope says which.  One for each camera;
  * the same frames, the same fixes.
  *
- * There are two, as there are two ways to localize an image, and not one with a choice: only the one on the
- * floor takes odometry, only the one in space predicts a pose, and their answers are different structs.
+ * There are two, as there are two ways to localize an image, and not one with a choice: only the one in space
+ * predicts a pose, and their answers are different structs.
  *
- * cairn_tracker follows a camera in space, by a constant velocity. */
+ * cairn_tracker follows a camera in space, by its odometry or a constant velocity. */
 CAIRN_API int32_t cairn_tracker_create(const cairn_map* map, cairn_tracker** tracker);
 /* Any option that `cairn localize --sequence` takes, as text: ("step_sigma_m", "0.3"), ("min_num_inliers",
  * "9").  The tracker forgets the frames before. */
@@ -352,17 +365,25 @@ CAIRN_API int32_t cairn_tracker_set_option(cairn_tracker* tracker, const char* n
  * error; after an error *fix has no fix, and the tracker is as before. */
 CAIRN_API int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image,
                                       const cairn_camera* camera, cairn_fix* fix);
-/* What is known of the next frame besides its pixels, for a tracker with the option ("min_place_probability",
- * "0.9"): it publishes a fix only where its place has this probability by all frames so far, as
- * cairn_place_belief has it.  Odometry, seconds [1] and gravity as there.  CAIRN_INVALID_ARGUMENT: the option
- * is 0, the default. */
+/* How the camera moved since the last frame, several calls add up: over the floor, in the frame that it had
+ * on it (CAIRN_UNSUPPORTED: a map whose unit is not the metre); or in space, from its frame then to that now,
+ * as visual or inertial odometry has it.  Without either it follows a constant velocity. */
 CAIRN_API int32_t cairn_tracker_move(cairn_tracker* tracker, double ahead_m, double left_m,
                                      double turn_left_rad);
+CAIRN_API int32_t cairn_tracker_move_camera(cairn_tracker* tracker,
+                                            const cairn_uncertain_pose* next_from_last);
+/* What else is known of the next frame, for a tracker with the option ("min_place_probability", "0.9"): it
+ * publishes a fix only where its place has this probability by all frames so far, as cairn_place_belief has
+ * it.  Seconds [1] and gravity as there.  CAIRN_INVALID_ARGUMENT: the option is 0, the default. */
 CAIRN_API int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds);
 CAIRN_API int32_t cairn_tracker_sense_up(cairn_tracker* tracker, double right, double down, double ahead,
                                          double sigma_deg);
 /* Where the next frame is expected.  *is_expected 0: the tracker is lost, and *prior is CAIRN_PRIOR_INIT. */
 CAIRN_API int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cairn_prior* prior);
+/* Where the camera was at the last frame: its fix, or where it moved since the last one; and after a move,
+ * where it is now.  *is_known 0: it had none yet, and *pose is CAIRN_UNCERTAIN_POSE_INIT. */
+CAIRN_API int32_t cairn_tracker_believe(cairn_tracker* tracker, int32_t* is_known,
+                                        cairn_uncertain_pose* pose);
 CAIRN_API int32_t cairn_tracker_destroy(cairn_tracker* tracker);
 
 /* cairn_visual_tracker follows a robot on the floor, by the visual map.  CAIRN_NOT_FOUND where the map has

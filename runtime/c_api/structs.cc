@@ -111,6 +111,22 @@ cairn_prior PriorFrom(const PosePrior& prior) {
   return given;
 }
 
+Result<UncertainPose> UncertainPoseOf(const cairn_uncertain_pose* given) {
+  CAIRN_RETURN_IF_ERROR(CheckStruct(given, "pose"));
+  const double* q = given->rotation_wxyz;
+  UncertainPose pose{{Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(given->translation_m)},
+                     Eigen::Map<const Matrix6d>(given->covariance)};
+  CAIRN_RETURN_IF_ERROR(CheckUncertainPose(pose));
+  return pose;
+}
+
+cairn_uncertain_pose UncertainPoseFrom(const UncertainPose& pose) {
+  cairn_uncertain_pose given = CAIRN_UNCERTAIN_POSE_INIT;
+  CopyPose(pose.pose, given.rotation_wxyz, given.translation_m);
+  std::copy_n(pose.covariance.data(), 36, given.covariance);
+  return given;
+}
+
 Status CheckFix(const cairn_fix* fix) { return CheckStruct(fix, "fix", offsetof(cairn_fix, scope)); }
 
 Status CheckFix(const cairn_floor_fix* fix) {

@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/camera/camera.h"
 #include "runtime/c_api/cairn.h"
+#include "runtime/track/camera_motion.h"
 #include "runtime/localize/localization.h"
 #include "runtime/map/map.h"
 #include "runtime/map/update_map.h"
@@ -35,6 +36,9 @@ Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat
 // NULL: none.
 Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given);
 cairn_prior PriorFrom(const PosePrior& prior);
+
+Result<UncertainPose> UncertainPoseOf(const cairn_uncertain_pose* given);
+cairn_uncertain_pose UncertainPoseFrom(const UncertainPose& pose);
 
 // Callers built with an earlier release give the fields that it had.
 Status CheckFix(const cairn_fix* fix);

@@ -121,6 +121,14 @@ int32_t cairn_tracker_move(cairn_tracker* tracker, double ahead_m, double left_m
   });
 }
 
+int32_t cairn_tracker_move_camera(cairn_tracker* tracker, const cairn_uncertain_pose* next_from_last) {
+  return Call("cairn_tracker_move_camera", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    CAIRN_ASSIGN_OR_RETURN(const UncertainPose motion, UncertainPoseOf(next_from_last));
+    return used->tracker->Move(motion);
+  });
+}
+
 int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds) {
   return Call("cairn_tracker_elapse", [&]() -> Status {
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
@@ -147,6 +155,21 @@ int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cair
     if (!expected) return Ok();
     Return(PriorFrom(*expected), prior);
     *is_expected = 1;
+    return Ok();
+  });
+}
+
+int32_t cairn_tracker_believe(cairn_tracker* tracker, int32_t* is_known, cairn_uncertain_pose* pose) {
+  if (is_known != nullptr) *is_known = 0;
+  return Call("cairn_tracker_believe", [&]() -> Status {
+    if (is_known == nullptr) return Misuse("is_known is NULL");
+    CAIRN_RETURN_IF_ERROR(CheckStruct(pose, "pose"));
+    Return(cairn_uncertain_pose CAIRN_UNCERTAIN_POSE_INIT, pose);
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    const std::optional<UncertainPose> believed = used->tracker->Believed();
+    if (!believed) return Ok();
+    Return(UncertainPoseFrom(*believed), pose);
+    *is_known = 1;
     return Ok();
   });
 }

@@ -36,6 +36,12 @@ Status CheckImageServo(const ImageServoOptions& options) {
   return CheckOptions(DescribeOptions(&checked));
 }
 
+Status CheckDescribed(size_t num_pixels, const DescriptorMatrix& descriptors) {
+  if (static_cast<Eigen::Index>(num_pixels) == descriptors.rows()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "{} pixels with {} descriptors", num_pixels,
+                   descriptors.rows());
+}
+
 }  // namespace
 
 Result<ServoTarget> TargetOfImage(const Map& map, int32_t image_idx, const std::optional<Camera>& camera) {
@@ -131,6 +137,7 @@ Result<ImageServo> ImageServo::ToImage(std::shared_ptr<const Map> map, int32_t i
 Result<ImageServo> ImageServo::ToTarget(ServoTarget target, const Camera& camera,
                                         const ImageServoOptions& options) {
   CAIRN_RETURN_IF_ERROR(CheckImageServo(options));
+  CAIRN_RETURN_IF_ERROR(CheckDescribed(target.pixels.size(), target.descriptors));
   ImageServo servo(options);
   servo.target_ = std::move(target);
   CAIRN_RETURN_IF_ERROR(servo.BeginWith(camera));
@@ -157,6 +164,7 @@ Result<ServoCommand> ImageServo::Step(const cv::Mat& grey, const Camera& camera)
 }
 
 Result<ServoCommand> ImageServo::StepFeatures(const Features& seen, const Camera& camera) {
+  CAIRN_RETURN_IF_ERROR(CheckDescribed(seen.keypoints.size(), seen.descriptors));
   if (!servo_) {
     CAIRN_RETURN_IF_ERROR(BeginWith(camera));
   } else if (!IsSameCamera(camera, camera_)) {

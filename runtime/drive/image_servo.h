@@ -71,7 +71,8 @@ class ImageServo {
   // such image, an option), NoData (an image that shows no landmarks), Corrupt, Io.
   static Result<ImageServo> ToImage(std::shared_ptr<const Map> map, int32_t image,
                                     const ImageServoOptions& options = {});
-  // To any target of the robot's camera.  Errors: InvalidArgument (camera, an option).
+  // To any target of the robot's camera.  Errors: InvalidArgument (camera, an option, another number of
+  // descriptors than of pixels).
   static Result<ImageServo> ToTarget(ServoTarget target, const Camera& camera,
                                      const ImageServoOptions& options = {});
 
@@ -80,7 +81,8 @@ class ImageServo {
   // InvalidArgument (an image that is not the camera's, another camera than in the step before, an image that
   // is not 8-bit grey), Corrupt, Io.  After an error the servo is as before.
   Result<ServoCommand> Step(const cv::Mat& grey, const Camera& camera);
-  // The same of features that the caller has, in pixels of the camera.  Errors: those of the camera.
+  // The same of features that the caller has, in pixels of the camera.  Errors: those of the camera;
+  // InvalidArgument (another number of descriptors than of keypoints).
   Result<ServoCommand> StepFeatures(const Features& seen, const Camera& camera);
 
   // Tells it that the last command did not move the robot: something stands in the way.

@@ -16,7 +16,7 @@ namespace {
 
 // A node shows what a robot sees that stands within this distance and turn of its image: a lattice of 0.6 m
 // with images every 45 degrees has one for each pose.
-constexpr double kSamePlaceM = 1;
+constexpr double kSameStartM = 1;
 constexpr double kSameHeadingDeg = 40;
 
 // Of starts that cannot be told from the followed one so far: bit j for start j.
@@ -139,7 +139,7 @@ class JointSearch {
   }
 
   bool ShowsPlace(NodeIdx node, const Pose& pose) const {
-    return CenterErrorM(node_poses_[node], pose) <= kSamePlaceM &&
+    return CenterErrorM(node_poses_[node], pose) <= kSameStartM &&
            RotationErrorDeg(node_poses_[node], pose) <= kSameHeadingDeg;
   }
 

@@ -129,19 +129,24 @@ PlanarPose Servo::AxleInTarget(const PlanarEpipoles& epipoles) const {
   return pose;
 }
 
-// The last command should have moved the robot by a known way along its heading.
+// The last command should have moved the camera by a known way: with the robot along its heading, and about
+// the middle of its axle as it turned.
 void Servo::LearnScale(const PlanarPose& pose) {
   if (!last_ || last_speed_m_s_ == 0) return;
   const PlanarPose before = last_->PoseInTarget();
-  // Where the robot drives, in the target's camera.
-  const double heading = before.heading_rad + 0.5 * WrapAngle(pose.heading_rad - before.heading_rad) -
-                         RadFromDeg(options_.camera_turn_deg);
-  const double ratio =
-      (pose.position - before.position).dot(Eigen::Vector2d(std::cos(heading), std::sin(heading)));
-  const double way_m = last_speed_m_s_ * options_.step_s;
-  if (way_m * ratio <= 0) return;  // noise
-  way_m_ = kForget * way_m_ + way_m * ratio;
-  way_ratio_ = kForget * way_ratio_ + ratio * ratio;
+  const double half_turn = 0.5 * WrapAngle(pose.heading_rad - before.heading_rad);
+  const Eigen::Rotation2Dd along(before.heading_rad + half_turn);
+  const Eigen::Vector2d camera_m(options_.camera_ahead_m, options_.camera_left_m);
+  const Eigen::Vector2d way_m =
+      along * (Eigen::Vector2d(last_speed_m_s_ * options_.step_s, 0) +
+               Eigen::Rotation2Dd(half_turn) * camera_m - Eigen::Rotation2Dd(-half_turn) * camera_m);
+  // The target's camera is turned on the robot, too.
+  const Eigen::Vector2d ratio =
+      Eigen::Rotation2Dd(RadFromDeg(options_.camera_turn_deg)) * (pose.position - before.position);
+  const double along_way = ratio.dot(way_m.normalized());
+  if (!(along_way > 0)) return;  // noise
+  way_m_ = kForget * way_m_ + way_m.norm() * along_way;
+  way_ratio_ = kForget * way_ratio_ + along_way * along_way;
 }
 
 double Servo::Patience() const {

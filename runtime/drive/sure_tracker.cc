@@ -1,6 +1,8 @@
 #include "runtime/drive/sure_tracker.h"
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/no_throw.h"
 #include "runtime/localize/measurement.h"
@@ -20,8 +22,27 @@ OptionTable DescribeOptions(SureTrackerOptions* o) {
     option.name = "place_" + option.name;
     table.push_back(std::move(option));
   }
+  std::vector<std::string> of_belief = NamesOf(table);
+  std::erase(of_belief, "min_place_probability");
+  AddCondition({"min_place_probability", {"not 0"}}, of_belief, &table);
   return table;
 }
+
+namespace {
+
+// Errors: InvalidArgument (out of range, or changed and without effect).
+Status CheckSureTracker(const SureTrackerOptions& options) {
+  SureTrackerOptions checked = options, defaults;
+  const OptionTable table = DescribeOptions(&checked), of_defaults = DescribeOptions(&defaults);
+  CAIRN_RETURN_IF_ERROR(CheckOptions(table));
+  for (size_t i = 0; i < table.size(); ++i) {
+    if (OptionValueText(table[i]) != OptionValueText(of_defaults[i]))
+      CAIRN_RETURN_IF_ERROR(CheckIsRead(table[i], table));
+  }
+  return Ok();
+}
+
+}  // namespace
 
 Localization PublishIfSure(Localization found, double place_probability, double min_place_probability) {
   if (!found.has_fix()) return found;
@@ -47,8 +68,7 @@ Result<SureTracker> SureTracker::Make(std::shared_ptr<const Map> map,
                                       const RegionTrackerOptions& tracker_options,
                                       const SureTrackerOptions& options) {
   return WithoutExceptions("sure tracker", [&]() -> Result<SureTracker> {
-    SureTrackerOptions checked = options;
-    CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+    CAIRN_RETURN_IF_ERROR(CheckSureTracker(options));
     SureTracker tracker(map, localizer_options, tracker_options, options);
     if (options.min_place_probability > 0) {
       CAIRN_ASSIGN_OR_RETURN(tracker.belief_, PlaceBelief::Make(std::move(map), options.belief));
@@ -59,15 +79,21 @@ Result<SureTracker> SureTracker::Make(std::shared_ptr<const Map> map,
 
 Status SureTracker::CheckBelieves() const {
   if (belief_) return Ok();
-  return MakeError(
-      ErrorCode::kInvalidArgument,
-      "min_place_probability is 0: every fix is published, and nothing reads how the robot moves; "
-      "set it, 0.9 say");
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "min_place_probability is 0: every fix is published, and nothing reads times or gravity; "
+                   "set it, 0.9 say");
 }
 
 Status SureTracker::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
-  CAIRN_RETURN_IF_ERROR(CheckBelieves());
-  return belief_->Move(way_m, turn_left_rad);
+  CAIRN_RETURN_IF_ERROR(tracker_->Move(way_m, turn_left_rad));
+  return belief_ ? belief_->Move(way_m, turn_left_rad) : Ok();
+}
+
+Status SureTracker::Move(const UncertainPose& next_from_last) {
+  CAIRN_RETURN_IF_ERROR(tracker_->Move(next_from_last));
+  if (!belief_ || !IsMetric(map_->head().frame)) return Ok();  // without a unit it follows links
+  const FloorMotion over_floor = OverFloor(next_from_last.pose);
+  return belief_->Move(over_floor.way_m, over_floor.turn_left_rad);
 }
 
 Status SureTracker::Elapse(double seconds) {

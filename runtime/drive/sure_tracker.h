@@ -11,7 +11,7 @@
 #include "core/options/options.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/localize/localizer.h"
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 
 namespace cairn {
 
@@ -40,14 +40,18 @@ Localization PublishIfSure(Localization found, double place_probability, double 
 // there.  One per camera, not for concurrent calls.
 class SureTracker {
  public:
-  // Errors: InvalidArgument (an option); with min_place_probability those of PlaceBelief::Make.
+  // Errors: InvalidArgument (an option, or one of the belief that nothing reads, as min_place_probability is
+  // 0); with min_place_probability those of PlaceBelief::Make.
   static Result<SureTracker> Make(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
                                   const RegionTrackerOptions& tracker_options,
                                   const SureTrackerOptions& options);
 
-  // What is known of the next frame besides its pixels: as PlaceBelief has it.  Errors: the same, and
-  // InvalidArgument where min_place_probability is 0, as nothing reads it.
+  // How the camera moved since the last frame: as RegionTracker and PlaceBelief have it, which takes of a
+  // motion in space what is over the floor (OverFloor).  Errors: the same.
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
+  Status Move(const UncertainPose& next_from_last);
+  // What else is known of the next frame besides its pixels: as PlaceBelief has it.  Errors: the same, and
+  // InvalidArgument where min_place_probability is 0, as nothing reads it.
   Status Elapse(double seconds);
   Status SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg);
 
@@ -58,6 +62,7 @@ class SureTracker {
   Result<Localization> TrackFeatures(Features features, const Camera& camera);
 
   std::optional<PosePrior> Prediction() const { return tracker_->Prediction(); }
+  std::optional<UncertainPose> Believed() const { return tracker_->Believed(); }
   // None where every fix is published.
   const std::optional<PlaceBelief>& belief() const { return belief_; }
 

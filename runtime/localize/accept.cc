@@ -7,8 +7,6 @@
 #include <set>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "runtime/localize/place_evidence.h"
 
 namespace cairn {
@@ -79,11 +77,6 @@ int NumCells(const Query& query, const std::vector<Correspondence>& inliers, int
                   static_cast<int>(keypoint.y * grid / query.camera.height));
   }
   return static_cast<int>(cells.size());
-}
-
-double LargestSigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(
-      std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
 }
 
 double Log10Choose(int n, int k) {
@@ -313,6 +306,18 @@ Localization DecideAmong(const std::vector<Localization>& found, double least_od
   for (const double each : odds) odds_of_others -= each;
   return Ambiguous(std::move(decided), std::move(poses), std::move(odds), std::max(0.0, odds_of_others),
                    numbers + " matches agree on poses at different places");
+}
+
+Localization BetterOf(Localization first, Localization second, const AcceptOptions& accept) {
+  if (!first.has_places() && !second.has_places()) {
+    const bool is_better =
+        std::pair(second.num_inliers, second.num_matches) >= std::pair(first.num_inliers, first.num_matches);
+    return is_better ? second : first;
+  }
+  if (!first.has_places()) return second;
+  if (!second.has_places()) return first;
+  if (!first.has_fix() && second.has_fix() && second.scope == Scope::kAll) return second;
+  return DecideAmong({std::move(first), std::move(second)}, 1, accept);
 }
 
 }  // namespace cairn

@@ -53,4 +53,9 @@ Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::
 Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
                          const AcceptOptions& accept);
 
+// The better of two answers, found among other landmarks.  Of two that say nothing the one that came farther
+// says more.  A fix at one of the places of an ambiguous answer does not decide for it, as the other place's
+// landmarks may not be among those of the fix; unless it was found among all.
+Localization BetterOf(Localization first, Localization second, const AcceptOptions& accept);
+
 }  // namespace cairn

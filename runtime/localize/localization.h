@@ -45,6 +45,8 @@ struct Localization {
   NoFix reason = NoFix::kNoCandidates;
   std::string message;  // why there is no fix: found and needed
   bool has_fix() const { return reason == NoFix::kNone; }
+  // Whether it says where the image may have been taken: a fix, or one of several places.
+  bool has_places() const { return has_fix() || !possible_poses.empty(); }
 
   // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given
   // is applied).

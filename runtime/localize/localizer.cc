@@ -64,24 +64,6 @@ bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspon
   return 2 * num_shared >= std::min(a.size(), b.size());
 }
 
-// Whether it says where the image may have been taken.
-bool HasPlaces(const Localization& found) { return found.has_fix() || !found.possible_poses.empty(); }
-
-// The better of two answers, found among other landmarks.  Of two that say nothing the one that came farther
-// says more.  A fix at one of the places of an ambiguous answer does not decide for it, as the other place's
-// landmarks may not be among those of the fix; unless it was found among all.
-Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
-  if (!HasPlaces(first) && !HasPlaces(second)) {
-    const bool is_better =
-        std::pair(second.num_inliers, second.num_matches) >= std::pair(first.num_inliers, first.num_matches);
-    return is_better ? second : first;
-  }
-  if (!HasPlaces(first)) return second;
-  if (!HasPlaces(second)) return first;
-  if (!first.has_fix() && second.has_fix() && second.scope == Scope::kAll) return second;
-  return DecideAmong({first, second}, 1, accept);
-}
-
 // Factor on the covariance of fixes in maps that do not say how keypoints err together: measured on the demo,
 // where it brings the normalised error squared from 10.7 to its 6 degrees of freedom.
 constexpr double kUnmeasuredScale = 1.8;
@@ -100,6 +82,12 @@ struct Localizer::FollowedUp {
   int num_unguided_inliers = 0;
   std::shared_ptr<const LandmarkSet> covisible;  // null: its own inliers
   GuidedMatches found;
+};
+
+// A pose, and the survey images near it.
+struct Localizer::PlaceToTry {
+  Pose cam_from_world;
+  std::vector<Candidate> near;
 };
 
 const char* ScopeName(Scope scope) {
@@ -195,7 +183,7 @@ Result<Localization> Localizer::LocalizeBetter(const Query& query, const std::op
   CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
   for (const Attempt& attempt : attempts) {
     CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, attempt));
-    best = Better(std::move(best), std::move(localization), options_.accept);
+    best = BetterOf(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
   CAIRN_ASSIGN_OR_RETURN(best, Answer(query, prior, std::move(best)));
@@ -212,7 +200,7 @@ Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
 
 Result<Localization> Localizer::Answer(const Query& query, const std::optional<PosePrior>& prior,
                                        Localization localization) const {
-  if (options_.exclude_look_alikes && localization.has_fix()) {
+  if (options_.exclude_look_alikes && localization.has_places()) {
     CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(query, prior, std::move(localization)));
   }
   localization.num_features = static_cast<int>(query.features.keypoints.size());
@@ -230,16 +218,17 @@ Result<Localization> Localizer::Answer(const Query& query, const std::optional<P
   return localization;
 }
 
-Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
-                                                  Localization best) const {
-  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
+Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
+    const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
-  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
-  CAIRN_ASSIGN_OR_RETURN(
-      const auto near,
-      RetrieveByPrior(*map_, {given_from_camera * best.cam_from_world, 0, 0}, options_.retrieve));
-  const NodeIdx node = near.empty() ? -1 : appearance->node_of_image[near[0].image];
-  if (node < 0 || appearance->look_alikes[node].empty()) return best;
+  std::vector<PlaceToTry> places;
+  const auto add = [&](const Pose& pose) -> Status {
+    CAIRN_ASSIGN_OR_RETURN(auto near,
+                           RetrieveByPrior(*map_, {given_from_camera * pose, 0, 0}, options_.retrieve));
+    places.push_back({pose, std::move(near)});
+    return Ok();
+  };
+  for (const Pose& pose : poses) CAIRN_RETURN_IF_ERROR(add(pose));
   std::vector<int32_t> possible;  // by the prior
   if (prior) {
     RetrieveOptions retrieve = options_.retrieve;
@@ -248,40 +237,56 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     possible = ImagesOf(candidates);
     std::sort(possible.begin(), possible.end());
   }
+  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (places[i].near.empty()) continue;
+    const int32_t image = places[i].near[0].image;
+    const NodeIdx node = appearance->node_of_image[image];
+    if (node < 0) continue;
+    CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
+    const Pose cam_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
+    for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
+      const int32_t other = appearance->node_images[look_alike.node].front();
+      if (prior && !std::binary_search(possible.begin(), possible.end(), other)) continue;
+      CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(other));
+      const Pose there = cam_from_nearest * other_image->cam_from_world;
+      // Of a place many images look alike.
+      const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
+        return !AreFarApart(place.cam_from_world, there, options_.accept);
+      });
+      if (!is_known) CAIRN_RETURN_IF_ERROR(add(there));
+    }
+  }
+  return places;
+}
+
+Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+                                                  Localization best) const {
+  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
+  const std::vector<Pose> poses =
+      best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(poses, prior));
+  if (places.size() == poses.size()) return best;
   // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
   // are among them, no match is much better than the next best.
-  const auto try_at = [&](const std::vector<Candidate>& images) -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(images)));
-    if (landmarks.empty()) return Localization();
-    return Try(query, {Scope::kImages, std::move(landmarks)});
-  };
   std::vector<Localization> found;
-  std::vector<Pose> tried = {best.cam_from_world};
-  CAIRN_ASSIGN_OR_RETURN(Localization here, try_at(near));
-  const bool is_here =
-      here.has_fix() && !AreFarApart(here.cam_from_world, best.cam_from_world, options_.accept);
-  found.push_back(is_here ? std::move(here) : best);
-  CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(near[0].image));
-  const Pose cam_from_nearest = best.cam_from_world * nearest->cam_from_world.Inverse();
-  for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
-    const int32_t image = appearance->node_images[look_alike.node].front();
-    if (prior && !std::binary_search(possible.begin(), possible.end(), image)) continue;
-    // Where the camera would be there.
-    CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(image));
-    const Pose there = cam_from_nearest * other_image->cam_from_world;
-    // Of a place many images look alike.
-    const bool was_tried = std::any_of(tried.begin(), tried.end(), [&](const Pose& each) {
-      return !AreFarApart(each, there, options_.accept);
-    });
-    if (was_tried) continue;
-    tried.push_back(there);
-    CAIRN_ASSIGN_OR_RETURN(const auto candidates,
-                           RetrieveByPrior(*map_, {given_from_camera * there, 0, 0}, options_.retrieve));
-    CAIRN_ASSIGN_OR_RETURN(Localization other, try_at(candidates));
-    if (HasPlaces(other)) found.push_back(std::move(other));
+  bool is_confirmed = true;
+  for (size_t i = 0; i < places.size(); ++i) {
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(places[i].near)));
+    Localization here;
+    if (!landmarks.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(here, Try(query, {Scope::kImages, std::move(landmarks)}));
+    }
+    const bool is_new = i >= poses.size();
+    const bool is_here =
+        here.has_fix() && !AreFarApart(here.cam_from_world, places[i].cam_from_world, options_.accept);
+    is_confirmed = is_confirmed && (is_new || is_here);
+    if (is_here || (is_new && here.has_places())) found.push_back(std::move(here));
   }
+  if (!is_confirmed) found.insert(found.begin(), best);
   Localization decided = DecideAmong(found, options_.min_look_alike_odds, options_.accept);
-  if (!decided.has_fix() || AreFarApart(decided.cam_from_world, best.cam_from_world, options_.accept))
+  if (!best.has_fix() || !decided.has_fix() ||
+      AreFarApart(decided.cam_from_world, best.cam_from_world, options_.accept))
     return decided;
   best.probability = decided.probability;
   return best;

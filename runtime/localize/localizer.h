@@ -56,6 +56,7 @@ class Localizer {
  private:
   struct Attempt;
   struct FollowedUp;
+  struct PlaceToTry;
   // `best`: what was found before.
   Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
                                       Localization best) const;
@@ -77,7 +78,11 @@ class Localizer {
   Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
                               const std::vector<Correspondence>& matches,
                               const std::vector<PoseEstimate>& firsts, Localization localization) const;
-  // `best`, unless a look-alike of its place explains the image nearly as well.
+  // These poses, and where the camera would be in the places that look like theirs, unless the prior excludes
+  // it.
+  Result<std::vector<PlaceToTry>> WithLookAlikes(const std::vector<Pose>& poses,
+                                                 const std::optional<PosePrior>& prior) const;
+  // `best`, a fix or one of several places, unless look-alikes of these explain the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
                                          Localization best) const;
   // A pose at another place that max_second_pose_ratio as many other matches agree on.

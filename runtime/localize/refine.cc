@@ -5,6 +5,7 @@
 #include <limits>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -291,6 +292,11 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   AddSystematic(options, &refined.covariance);
   if (!refined.covariance.allFinite()) return std::nullopt;
   return refined;
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(
+      std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
 }
 
 Matrix6d TransformCovariance(const Pose& b_from_cam, const Matrix6d& covariance) {

@@ -44,6 +44,9 @@ struct RefinedPose {
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
                                                     const Pose& initial, const RefineOptions& options);
 
+// Of a covariance's worst direction.
+double LargestSigma(const Eigen::Matrix3d& covariance);
+
 // Covariance of b_from_world for b_from_cam * cam_from_world: Ad C Ad'.
 Matrix6d TransformCovariance(const Pose& b_from_cam, const Matrix6d& covariance);
 

@@ -90,8 +90,9 @@ Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera
   return given ? *given : ValueOrThrow(map.CameraForSize(grey.cols, grey.rows));
 }
 
-PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
-                    double sigma_m, double sigma_deg) {
+namespace {
+
+Pose MakePose(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation) {
   if (rotation_wxyz.size() != 4 || translation.size() != 3)
     throw py::value_error(fmt::format("rotation_wxyz has {} numbers and translation {}; expected 4 and 3",
                                       rotation_wxyz.size(), translation.size()));
@@ -101,10 +102,33 @@ PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<
         fmt::format("rotation_wxyz has the length {}; expected a unit quaternion, w first", q.norm()));
   const Eigen::Vector3d t(translation[0], translation[1], translation[2]);
   if (!t.allFinite()) throw py::value_error("translation is not finite");
+  return {q.normalized(), t};
+}
+
+}  // namespace
+
+PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
+                    double sigma_m, double sigma_deg) {
+  const Pose pose = MakePose(rotation_wxyz, translation);
   if (!(sigma_m > 0 && sigma_deg > 0 && std::isfinite(sigma_m + sigma_deg)))
     throw py::value_error(
         fmt::format("sigma_m is {} and sigma_deg {}; both must be positive", sigma_m, sigma_deg));
-  return {.cam_from_world = {q.normalized(), t}, .sigma_m = sigma_m, .sigma_deg = sigma_deg};
+  return {.cam_from_world = pose, .sigma_m = sigma_m, .sigma_deg = sigma_deg};
+}
+
+UncertainPose MakeUncertainPose(const std::vector<double>& rotation_wxyz,
+                                const std::vector<double>& translation,
+                                const std::optional<std::vector<std::vector<double>>>& covariance) {
+  UncertainPose made{MakePose(rotation_wxyz, translation)};
+  if (!covariance) return made;
+  const auto has_six = [](const std::vector<double>& row) { return row.size() == 6; };
+  if (covariance->size() != 6 || !std::all_of(covariance->begin(), covariance->end(), has_six))
+    throw py::value_error("covariance has not six rows of six numbers");
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) made.covariance(i, j) = (*covariance)[i][j];
+  if (const Status checked = CheckUncertainPose(made); !checked.ok())
+    throw py::value_error(checked.error().message);
+  return made;
 }
 
 py::array_t<double> RotationArray(const Eigen::Quaterniond& rotation) {

@@ -10,6 +10,7 @@
 #include <pybind11/pybind11.h>
 
 #include "core/seal/signing_key.h"
+#include "runtime/track/camera_motion.h"
 #include "runtime/localize/localizer.h"
 
 // Between Python's values and the runtime's.
@@ -59,6 +60,11 @@ Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera
 // Throws a ValueError for an invalid rotation or number.
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg);
+
+// Throws a ValueError for an invalid rotation, number or shape; None: no error at all.
+UncertainPose MakeUncertainPose(const std::vector<double>& rotation_wxyz,
+                                const std::vector<double>& translation,
+                                const std::optional<std::vector<std::vector<double>>>& covariance);
 
 // New arrays: w x y z, (n,), (m, n) and (4, 4).
 pybind11::array_t<double> RotationArray(const Eigen::Quaterniond& rotation);

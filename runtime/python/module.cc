@@ -1,4 +1,5 @@
 // The Python module's native part, cairn._cairn: what runtime/python/cairn/__init__.py makes public.
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -192,6 +193,20 @@ void BindLocalizer(py::module_& module) {
         const Eigen::Vector3d center = self.cam_from_world.Center();
         return fmt::format("<cairn.Prior at ({:.3f}, {:.3f}, {:.3f}) m, +- {:g} m, {:g} deg>", center.x(),
                            center.y(), center.z(), self.sigma_m, self.sigma_deg);
+      });
+  py::class_<UncertainPose>(module, "UncertainPose")
+      .def(py::init(&MakeUncertainPose), py::arg("rotation_wxyz"), py::arg("translation"),
+           py::arg("covariance") = py::none())
+      .def_property_readonly("rotation_wxyz",
+                             [](const UncertainPose& self) { return RotationArray(self.pose.rotation); })
+      .def_property_readonly("translation",
+                             [](const UncertainPose& self) { return VectorArray(self.pose.translation); })
+      .def_property_readonly("covariance",
+                             [](const UncertainPose& self) { return MatrixArray(self.covariance); })
+      .def("__repr__", [](const UncertainPose& self) {
+        const Eigen::Vector3d& t = self.pose.translation;
+        return fmt::format("<cairn.UncertainPose with translation ({:.3f}, {:.3f}, {:.3f}) m, +- {:.3f} m>",
+                           t.x(), t.y(), t.z(), std::sqrt(self.covariance.diagonal().tail<3>().maxCoeff()));
       });
   py::class_<Localization>(module, "Fix")
       .def("__bool__", &Localization::has_fix)

@@ -34,6 +34,10 @@ class PyTracker {
     const auto used = one_thread_.Use();
     ThrowIfError(tracker_->Move({ahead_m, left_m}, turn_left_rad));
   }
+  void MoveCamera(const UncertainPose& next_from_last) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(tracker_->Move(next_from_last));
+  }
   void Elapse(double seconds) {
     const auto used = one_thread_.Use();
     ThrowIfError(tracker_->Elapse(seconds));
@@ -58,6 +62,10 @@ class PyTracker {
   std::optional<PosePrior> Predict() {
     const auto used = one_thread_.Use();
     return tracker_->Prediction();
+  }
+  std::optional<UncertainPose> Believe() {
+    const auto used = one_thread_.Use();
+    return tracker_->Believed();
   }
 
  private:
@@ -155,9 +163,11 @@ void BindTrackers(py::module_& module) {
            py::arg("log") = py::none())
       .def("track", &PyTracker::Track, py::arg("image").noconvert(), py::arg("camera") = py::none())
       .def("move", &PyTracker::Move, py::arg("ahead_m"), py::arg("left_m"), py::arg("turn_left_rad"))
+      .def("move_camera", &PyTracker::MoveCamera, py::arg("next_from_last"))
       .def("elapse", &PyTracker::Elapse, py::arg("seconds"))
       .def("sense_up", &PyTracker::SenseUp, py::arg("up_in_camera"), py::arg("sigma_deg"))
-      .def("predict", &PyTracker::Predict);
+      .def("predict", &PyTracker::Predict)
+      .def("believe", &PyTracker::Believe);
   py::class_<PyVisualTracker>(module, "VisualTracker")
       .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))
       .def("move", &PyVisualTracker::Move, py::arg("ahead_m"), py::arg("left_m"), py::arg("turn_left_rad"))

@@ -15,7 +15,7 @@
 #include "runtime/c_api/cairn.h"
 #include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 #include "runtime/visual_map/visual_tracker.h"
 #include "tests/install/c_image.h"
 #include "tests/install/poster_drive.h"
@@ -126,8 +126,45 @@ TEST_F(CTrackers, InSpaceGiveTheFixesOfTheCxxTrackerBitForBit) {
   }
 }
 
+TEST_F(CTrackers, GoOnInTheDarkByOdometryAsTheCxxTrackerDoes) {
+  RegionTracker tracker(map_);
+  const cv::Mat dark = cv::Mat::zeros(QueryCamera().height, QueryCamera().width, CV_8UC1);
+  int32_t is_known = -1;
+  cairn_uncertain_pose believed = CAIRN_UNCERTAIN_POSE_INIT;
+  ASSERT_EQ(cairn_tracker_believe(tracker_, &is_known, &believed), CAIRN_OK);
+  EXPECT_EQ(is_known, 0);
+  const auto track = [&](const cv::Mat& picture) {
+    const cairn_image image = ImageOf(picture);
+    cairn_fix fix = CAIRN_FIX_INIT;
+    EXPECT_EQ(cairn_tracker_track(tracker_, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+    ExpectSame(fix, *tracker.Track(picture, QueryCamera()));
+    ASSERT_EQ(cairn_tracker_believe(tracker_, &is_known, &believed), CAIRN_OK);
+    ASSERT_EQ(is_known, 1);
+    ExpectSamePose(believed.rotation_wxyz, believed.translation_m, tracker.Believed()->pose);
+    EXPECT_EQ(Eigen::Map<const Matrix6d>(believed.covariance), tracker.Believed()->covariance);
+  };
+  track(Drive().frames()[0].picture);
+  ASSERT_EQ(cairn_tracker_move(tracker_, 0.2, 0.05, 0.1), CAIRN_OK) << cairn_last_error();
+  ASSERT_TRUE(tracker.Move({0.2, 0.05}, 0.1).ok());
+  track(dark);
+  cairn_uncertain_pose motion = CAIRN_UNCERTAIN_POSE_INIT;
+  motion.translation_m[2] = -0.3;  // ahead
+  for (int i = 0; i < 6; ++i) motion.covariance[7 * i] = 1e-4;
+  ASSERT_EQ(cairn_tracker_move_camera(tracker_, &motion), CAIRN_OK) << cairn_last_error();
+  ASSERT_TRUE(
+      tracker.Move({{Eigen::Quaterniond::Identity(), {0, 0, -0.3}}, 1e-4 * Matrix6d::Identity()}).ok());
+  track(dark);
+  motion.covariance[0] = -1;
+  EXPECT_EQ(cairn_tracker_move_camera(tracker_, &motion), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), testing::HasSubstr("negative variance"));
+  EXPECT_EQ(cairn_tracker_move_camera(tracker_, nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_tracker_move(tracker_, std::nan(""), 0, 0), CAIRN_INVALID_ARGUMENT);
+  believed.size = 8;
+  EXPECT_EQ(cairn_tracker_believe(tracker_, &is_known, &believed), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_tracker_believe(tracker_, nullptr, &believed), CAIRN_INVALID_ARGUMENT);
+}
+
 TEST_F(CTrackers, PublishWhatIsSureAsTheCxxTrackerDoes) {
-  EXPECT_EQ(cairn_tracker_move(tracker_, 0.1, 0, 0), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_tracker_elapse(tracker_, 0.1), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_INVALID_ARGUMENT);
   EXPECT_THAT(cairn_last_error(), testing::HasSubstr("min_place_probability"));

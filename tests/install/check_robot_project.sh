@@ -47,7 +47,7 @@ expect ./where_cc
 # one that has an atlas of many maps: atlas.h, atlas_localizer.h, atlas_route.h, and atlas_file.h with descriptor_code.h;
 # one that is steered by its camera: image_servo.h, the servo of servo.h with its eyes.
 headers=$(cd "$root/include/cairn" && find . -name '*.h' | sed 's,^\./,,' | LC_ALL=C sort -r)
-if [ "$(echo "$headers" | wc -l)" -gt 56 ]; then
+if [ "$(echo "$headers" | wc -l)" -gt 57 ]; then
   echo "more headers are installed than fit on a screen:" $headers >&2
   exit 1
 fi

@@ -576,8 +576,43 @@ class Following(unittest.TestCase):
             self.assertEqual(bool(fix), expected["fix"])
             self.assertEqual(fix.probability, expected.get("probability", 0))
         with self.assertRaises(cairn.Error) as caught:
-            cairn.Tracker(self.map).move(1, 0, 0)
+            cairn.Tracker(self.map).elapse(1)
         self.assertIn("min_place_probability", str(caught.exception))
+
+    def test_goes_on_in_the_dark_by_odometry_as_the_program_does(self):
+        frames = [self.frames[0], POSTER / "blank.pgm", POSTER / "blank.pgm"]
+        with tempfile.NamedTemporaryFile("w", suffix=".txt") as wheels:
+            wheels.write("0 0 0\n0.2 0.05 6\n0.3 0 0\n")
+            wheels.flush()
+            run = subprocess.run([PROGRAM, "localize", POSTER / "drive.cairn", *frames, "--sequence", "--odometry", wheels.name],
+                                 capture_output=True, check=False, text=True)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        tracker = cairn.Tracker(self.map)
+        self.assertIsNone(tracker.believe())
+        for frame, moved, line in zip(frames, ((0, 0, 0), (0.2, 0.05, 6 * math.pi / 180), (0.3, 0, 0)), run.stdout.splitlines()):
+            if tracker.believe():
+                tracker.move(*moved)
+            fix, expected = tracker.track(read_pgm(frame)), json.loads(line)
+            self.assertEqual(bool(fix), expected["fix"])
+            believed = tracker.believe()
+            if fix:
+                self.assertEqual(believed.translation.tolist(), fix.translation.tolist())
+                self.assertNotIn("believed", expected)
+                continue
+            self.assertEqual(believed.rotation_wxyz.tolist(), expected["believed"]["rotation_wxyz"])
+            self.assertEqual(believed.translation.tolist(), expected["believed"]["translation_m"])
+            self.assertEqual(believed.covariance.T.ravel().tolist(), expected["believed"]["covariance"])
+        # A camera that moves ahead has what it saw nearer.
+        before = believed.translation
+        tracker.move_camera(cairn.UncertainPose([1, 0, 0, 0], [0, 0, -0.3], 1e-4 * numpy.eye(6)))
+        numpy.testing.assert_allclose(tracker.believe().translation - before, [0, 0, -0.3], atol=1e-12)
+        self.assertIn("UncertainPose", repr(believed))
+        for wrong in (([1, 0, 0], [0, 0, 0]), ([2, 0, 0, 0], [0, 0, 0]), ([1, 0, 0, 0], [0, 0, math.nan]),
+                      ([1, 0, 0, 0], [0, 0, 0], numpy.eye(5)), ([1, 0, 0, 0], [0, 0, 0], -numpy.eye(6))):
+            with self.assertRaises(ValueError):
+                cairn.UncertainPose(*wrong)
+        with self.assertRaises(cairn.Error):
+            tracker.move(math.nan, 0, 0)
 
     def test_in_space_gives_the_programs_poses_bit_for_bit(self):
         tracker = cairn.Tracker(self.map)

@@ -403,6 +403,37 @@ class Node(unittest.TestCase):
         self.assertEqual(name, "r3")
         self.assertGreater(probability, 0.5)
 
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_follows_by_odometry_through_the_dark(self):
+        """Pictures are 5 cm apart; nothing is seen for 60 cm and four seconds, longer than a constant velocity is followed."""
+        pictures = [read_pgm(POSTER / f"room{i}.pgm") for i in range(25)]
+        for name, has_odometry in (("wheeled", True), ("pushed", False)):
+            robot = self.Robot(self, name)
+            y = 3.0
+
+            def drive(by_m):
+                nonlocal y
+                y += by_m
+                message = Odometry()
+                message.header.stamp = robot.stamp + rospy.Duration(0.25)
+                message.pose.pose.position.y = y
+                message.pose.pose.orientation.z, message.pose.pose.orientation.w = numpy.sin(numpy.pi / 4), numpy.cos(numpy.pi / 4)
+                if has_odometry:
+                    robot.publishers["odom"].publish(message)
+                    time.sleep(0.05)
+
+            for number in (0, 1, 2):
+                drive(0.05)
+                status = robot.show(pictures[number])
+            self.assertEqual(status["scope"], "track")
+            for _ in range(15):
+                drive(0.04)
+                self.assertEqual(robot.show(numpy.full_like(pictures[0], 90))["reason"], "too_few_features")
+            drive(0.05)
+            status = robot.show(pictures[15])
+            self.assertEqual(status["reason"], "none")
+            self.assertEqual(status["scope"] == "track", has_odometry)
+
     def test_bad_parameters_end_the_node_with_a_sentence(self):
         for number, (arguments, words, code) in enumerate(((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),

@@ -13,7 +13,7 @@ A robot that may be in any of many maps asks an Atlas of them: AtlasLocalizer.
 
 A way over survey images is Map.route; a Servo steers a robot from one to the next by its camera.
 
-Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
+Frames in order go to a Tracker (in space) or a VisualTracker (on the floor), with odometry where there is any, one per camera.
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
 """
@@ -39,6 +39,7 @@ from ._cairn import (
     StartHypotheses,
     StartHypothesis,
     Tracker,
+    UncertainPose,
     VisualTracker,
     __version__,
     roll_back_map,
@@ -67,6 +68,7 @@ __all__ = [
     "StartHypotheses",
     "StartHypothesis",
     "Tracker",
+    "UncertainPose",
     "VisualTracker",
     "__version__",
     "roll_back_map",

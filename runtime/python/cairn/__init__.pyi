@@ -313,6 +313,27 @@ class AtlasLocalizer:
         """`camera` None: each map's own camera of the image's size."""
 
 @final
+class UncertainPose:
+    """A pose and how well it is known: a camera's cam_from_world, or how it moved from a frame to the next."""
+
+    def __init__(
+        self,
+        rotation_wxyz: Sequence[float] | NDArray[np.float64],
+        translation: Sequence[float] | NDArray[np.float64],
+        covariance: Sequence[Sequence[float]] | NDArray[np.float64] | None = None,
+    ) -> None:
+        """`covariance`: (6, 6); None: it has no error."""
+    @property
+    def rotation_wxyz(self) -> NDArray[np.float64]:
+        """A unit quaternion: (4,)"""
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Metres: (3,)"""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Rotation (rad), translation (m), of the left perturbation: (6, 6)"""
+
+@final
 class Prior:
     """Where the camera is believed to be: cam_from_world, and its standard deviations."""
 
@@ -469,15 +490,26 @@ class Tracker:
     def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
         """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
     def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
+        """How the camera moved over the floor since the last frame, in the frame that it had on it; several calls add up.
+
+        Without it, or move_camera, it follows a constant velocity.  Raises Error: unsupported (a map whose unit is not the metre).
+        """
+    def move_camera(self, next_from_last: UncertainPose) -> None:
+        """The same in space, from the camera's frame at the last frame to that now, as visual or inertial odometry has it."""
+    def elapse(self, seconds: float) -> None:
         """With min_place_probability=0.9 a fix is published only where its place has this probability by all frames so far.
 
-        What is known of the next frame besides its pixels: as PlaceBelief's.  Raises Error: invalid_argument (the option is 0, the
+        This and sense_up say what else is known of the next frame: as PlaceBelief's.  Raises Error: invalid_argument (the option is 0, the
         default).
         """
-    def elapse(self, seconds: float) -> None: ...
     def sense_up(self, up_in_camera: Sequence[float], sigma_deg: float) -> None: ...
     def predict(self) -> Prior | None:
         """Where the next frame is expected; None when lost."""
+    def believe(self) -> UncertainPose | None:
+        """Where the camera was at the last frame: its fix, or where it moved since the last one; after a move, where it is now.
+
+        None before the first fix.
+        """
 
 @final
 class VisualTracker:

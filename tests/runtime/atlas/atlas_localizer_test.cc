@@ -196,6 +196,21 @@ TEST_F(AtlasLocalizerTest, KeepsTheMapsThatWereAskedForLast) {
   EXPECT_NE(*atlas->OpenMap(0), first);
 }
 
+TEST_F(AtlasLocalizerTest, ClosesMapsWhoseLoadedPartsAreTooMuchTogether) {
+  int64_t num_bytes_of_first = 0;
+  const auto kept_after = [&](int64_t memory_budget_bytes) {
+    const auto atlas = Open(Rows(), {.memory_budget_bytes = memory_budget_bytes});
+    const auto first = *atlas->OpenMap(0), second = *atlas->OpenMap(1);
+    EXPECT_TRUE(first->AllLandmarks().ok() && second->AllLandmarks().ok());
+    num_bytes_of_first = first->num_kept_bytes();
+    EXPECT_TRUE(atlas->OpenMap(2).ok());
+    return std::pair(*atlas->OpenMap(1) == second, *atlas->OpenMap(0) == first);
+  };
+  EXPECT_EQ(kept_after(AtlasOptions().memory_budget_bytes), std::pair(true, true));
+  ASSERT_GT(num_bytes_of_first, 0);
+  EXPECT_EQ(kept_after(num_bytes_of_first + num_bytes_of_first / 2), std::pair(true, false));
+}
+
 TEST_F(AtlasLocalizerTest, IsTheAtlasThatWasAskedFor) {
   AtlasRows rows = Rows();
   rows.epoch = 3;
@@ -208,6 +223,7 @@ TEST_F(AtlasLocalizerTest, IsTheAtlasThatWasAskedFor) {
   EXPECT_EQ(code({.name = "halls"}), ErrorCode::kOtherMap);
   EXPECT_EQ(code({.min_epoch = 4}), ErrorCode::kNotNewer);
   EXPECT_EQ(code({.max_num_open_maps = 0}), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code({.memory_budget_bytes = 0}), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code({.public_key = MakeKeyPair().public_key}), ErrorCode::kNotSigned);
   const auto atlas = *Atlas::Open(Path("of.atlas"));
   EXPECT_EQ(*atlas->FindMap("room 2"), 2);

@@ -233,15 +233,27 @@ TEST(Servo, KeepsToItsGreatestSpeeds) {
 
 TEST(Servo, LearnsHowFarTheSceneIs) {
   const ServoScene scene = Room();
-  Servo servo = *Servo::Create(scene.camera, {});
-  EXPECT_DOUBLE_EQ(servo.scene_distance_m(), 1);
-  Random random(1);
-  PlanarPose pose{{-2, 0.1}, 0};
-  for (int step = 0; step < 12; ++step) {
-    const ServoCommand command = servo.Step(scene.Match(pose, {}, &random));
-    pose = Moved(pose, command.speed_m_s, command.turn_rad_s, ServoOptions().step_s);
+  const auto learnt_m = [&](const PlanarPose& start, const PlanarPose& mounting) {
+    Servo servo = *Servo::Create(scene.camera, {.camera_ahead_m = mounting.position.x(),
+                                                .camera_left_m = mounting.position.y(),
+                                                .camera_turn_deg = DegFromRad(mounting.heading_rad)});
+    EXPECT_DOUBLE_EQ(servo.scene_distance_m(), 1);
+    Random random(1);
+    PlanarPose axle = start;
+    for (int step = 0; step < 12; ++step) {
+      const ServoCommand command = servo.Step(scene.Match(Composed(axle, mounting), mounting, &random));
+      axle = Moved(axle, command.speed_m_s, command.turn_rad_s, ServoOptions().step_s);
+    }
+    return servo.scene_distance_m();
+  };
+  EXPECT_NEAR(learnt_m({{-2, 0.1}, 0}, {}), 4.8, 1);
+  // While it turns, a camera beside the axle goes another way than the robot.
+  const double on_axle_m = learnt_m({{-2, 0.4}, 0.15}, {});
+  for (const PlanarPose& mounting :
+       {PlanarPose{{0, 0.4}, 0}, PlanarPose{{0, -0.4}, 0}, PlanarPose{{0.3, 0.2}, -0.3}}) {
+    EXPECT_NEAR(learnt_m({{-2, 0.4}, 0.15}, mounting), on_axle_m, 0.1 * on_axle_m)
+        << mounting.position.transpose();
   }
-  EXPECT_NEAR(servo.scene_distance_m(), 4.8, 1);
 }
 
 TEST(Servo, StopsAndSaysSoWhereMatchesTellNothing) {

@@ -43,11 +43,46 @@ TEST(SureTracker, WithoutAProbabilityItIsARegionTracker) {
     EXPECT_EQ(found.cam_from_world.translation, expected.cam_from_world.translation);
     EXPECT_EQ(found.probability, expected.probability);
   }
-  for (const Status& status : {every.Move({1, 0}, 0), every.Elapse(1), every.SenseUp({0, -1, 0}, 1)}) {
+  EXPECT_TRUE(every.Move({1, 0}, 0).ok());
+  for (const Status& status : {every.Elapse(1), every.SenseUp({0, -1, 0}, 1)}) {
     ASSERT_FALSE(status.ok());
     EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(status.error().message, testing::HasSubstr("min_place_probability"));
   }
+}
+
+TEST(SureTracker, OdometryMovesItsTrackerAndItsBelief) {
+  for (const double min_place_probability : {0.0, 0.9}) {
+    SureTracker over_floor = Make({.min_place_probability = min_place_probability});
+    SureTracker in_space = over_floor;
+    ASSERT_TRUE(Show(&over_floor, OnDrive(0), 0).has_fix());
+    ASSERT_TRUE(Show(&in_space, OnDrive(0), 0).has_fix());
+    const Pose motion = OnDrive(20) * OnDrive(0).Inverse();
+    const FloorMotion on_floor = OverFloor(motion);
+    ASSERT_TRUE(over_floor.Move(on_floor.way_m, on_floor.turn_left_rad).ok());
+    ASSERT_TRUE(in_space.Move({motion, 1e-4 * Matrix6d::Identity()}).ok());
+    for (SureTracker* tracker : {&over_floor, &in_space}) {
+      EXPECT_LT(CenterErrorM(tracker->Believed()->pose, OnDrive(20)), 0.05);
+      const Localization found = Show(tracker, OnDrive(20), 20);
+      EXPECT_TRUE(found.has_fix());
+      EXPECT_EQ(found.scope, Scope::kTrack);
+    }
+    if (!over_floor.belief()) continue;
+    for (size_t i = 0; i < over_floor.belief()->probabilities().size(); ++i)
+      EXPECT_NEAR(over_floor.belief()->probabilities()[i], in_space.belief()->probabilities()[i], 1e-6);
+  }
+}
+
+TEST(SureTracker, OptionsOfABeliefThatNobodyAskedForAreRefused) {
+  const auto error_of = [](const SureTrackerOptions& options) {
+    const auto tracker = SureTracker::Make(RoomMap(), {}, {}, options);
+    return tracker.ok() ? "" : tracker.error().message;
+  };
+  EXPECT_THAT(
+      error_of({.belief = {.fix_ratio = 0.7}}),
+      testing::AllOf(testing::HasSubstr("place_fix_ratio"), testing::HasSubstr("min_place_probability")));
+  EXPECT_THAT(error_of({.look_anew_s = 2}), testing::HasSubstr("look_anew_s"));
+  EXPECT_EQ(error_of({.min_place_probability = 0.5, .look_anew_s = 2, .belief = {.fix_ratio = 0.7}}), "");
 }
 
 TEST(SureTracker, AFixIsPublishedWhenItsPlaceIsSure) {

@@ -1,11 +1,14 @@
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/blocks/map_blocks.h"
 #include "runtime/localize/localizer.h"
-#include "runtime/localize/region_tracker.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/track/region_tracker.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
@@ -16,35 +19,41 @@ const SyntheticRoom& Room() {
   return room;
 }
 
-// The room, and a twin of it 30 m away that words and regions do not lead to, as the survey knows.
-MapRows TwinRooms() {
+constexpr double kApartM = 30;
+
+// The room, and others like it, each 30 m from the one before, that words and regions do not lead to, as the
+// survey knows.
+MapRows RoomsAlike(int num_rooms) {
   MapRows rows = Room().rows;
   const auto num_images = static_cast<int32_t>(rows.images.size());
   const auto num_landmarks = static_cast<LandmarkIdx>(rows.landmarks.size());
-  const Pose from_twin{Eigen::Quaterniond::Identity(), {-30, 0, 0}};
-  for (LandmarkIdx i = 0; i < num_landmarks; ++i) {
-    rows.landmarks.push_back(rows.landmarks[i]);
-    rows.landmarks.back().position.x() += 30;
+  rows.descriptors = Room().rows.descriptors.replicate(num_rooms, 1);
+  for (int room = 1; room < num_rooms; ++room) {
+    const Pose from_other{Eigen::Quaterniond::Identity(), {-kApartM * room, 0, 0}};
+    for (LandmarkIdx i = 0; i < num_landmarks; ++i) {
+      rows.landmarks.push_back(rows.landmarks[i]);
+      rows.landmarks.back().position.x() += kApartM * room;
+    }
+    for (int32_t i = 0; i < num_images; ++i) {
+      MapImage other = rows.images[i];
+      other.image_id += room * num_images;
+      other.cam_from_world = other.cam_from_world * from_other;
+      other.station = -1;
+      for (LandmarkIdx& landmark : other.landmarks) landmark += room * num_landmarks;
+      rows.images.push_back(std::move(other));
+    }
   }
-  const DescriptorMatrix descriptors = rows.descriptors;
-  rows.descriptors.resize(2 * num_landmarks, kDescriptorDim);
-  rows.descriptors << descriptors, descriptors;
-  for (int32_t i = 0; i < num_images; ++i) {
-    MapImage twin = rows.images[i];
-    twin.image_id += num_images;
-    twin.cam_from_world = twin.cam_from_world * from_twin;
-    twin.station = -1;
-    for (LandmarkIdx& landmark : twin.landmarks) landmark += num_landmarks;
-    rows.images.push_back(std::move(twin));
-  }
-  for (int32_t i = 0; i < 2 * num_images; ++i)
+  for (int32_t i = 0; i < num_rooms * num_images; ++i)
     rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.7});
-  for (int32_t i = 0; i < num_images; ++i) rows.appearance[i].look_alikes = {{num_images + i, 1}};
+  for (int32_t i = 0; i < num_images; ++i) {
+    for (int room = 1; room < num_rooms; ++room)
+      rows.appearance[i].look_alikes.push_back({room * num_images + i, 1});
+  }
   return rows;
 }
 
 TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
-  MapRows rows = TwinRooms();
+  MapRows rows = RoomsAlike(2);
   const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
   const Features features = RenderFeatures(Room(), truth, {}, 3);
   LocalizerOptions options;
@@ -58,7 +67,7 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
   EXPECT_LT(std::min(CenterErrorM(withheld.possible_poses[0], truth),
                      CenterErrorM(withheld.possible_poses[1], truth)),
             0.1);
-  EXPECT_NEAR(CenterErrorM(withheld.possible_poses[0], withheld.possible_poses[1]), 30, 0.2);
+  EXPECT_NEAR(CenterErrorM(withheld.possible_poses[0], withheld.possible_poses[1]), kApartM, 0.2);
   const Localization with_prior = localize(PosePrior{truth, 1, 10});
   ASSERT_TRUE(with_prior.has_fix()) << with_prior.message;
   EXPECT_LT(CenterErrorM(with_prior.cam_from_world, truth), 0.1);
@@ -87,9 +96,42 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
   EXPECT_TRUE(localize(std::nullopt).has_fix());
 }
 
+// What is matched leads to the room and to the second one, each with half of what it shows; the third is like
+// the first.
+TEST(Localizer, NamesAllPlacesThatLookAlikeWhereItIsOneOfTwo) {
+  MapRows rows = RoomsAlike(3);
+  const Eigen::Index num_landmarks = rows.descriptors.rows() / 3;
+  Random random(13);
+  for (Eigen::Index i = 0; i < num_landmarks; ++i) {
+    const bool differs_in_second = random.Uniform() < 0.5;
+    for (const int room : {0, 1, 2}) {
+      if (differs_in_second == (room == 1))
+        rows.descriptors.row(room * num_landmarks + i) = RandomDescriptor(random);
+    }
+  }
+  std::vector<LandmarkIdx> of_two(2 * num_landmarks);
+  std::iota(of_two.begin(), of_two.end(), 0);
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const auto rooms_of = [&](bool exclude_look_alikes) {
+    LocalizerOptions options;
+    options.exclude_look_alikes = exclude_look_alikes;
+    const Localizer localizer(*Map::FromRows(rows), options);
+    const Query query = *localizer.QueryFromFeatures(RenderFeatures(Room(), truth, {}, 3), Room().camera);
+    const Localization found = *localizer.LocalizeAmong(query, Scope::kVotes, of_two, std::nullopt);
+    EXPECT_EQ(found.reason, NoFix::kAmbiguous) << found.message;
+    std::vector<long> rooms;
+    for (const Pose& pose : found.possible_poses)
+      rooms.push_back(std::lround((pose.Center() - truth.Center()).x() / kApartM));
+    std::sort(rooms.begin(), rooms.end());
+    return rooms;
+  };
+  EXPECT_THAT(rooms_of(false), testing::ElementsAre(0, 1));
+  EXPECT_THAT(rooms_of(true), testing::ElementsAre(0, 1, 2));
+}
+
 // The twin's landmarks look a little different, so that the visible ones vote for the room; alone they match.
 TEST(RegionTracker, WithholdsAVotedFixUntilTheLookAlikeIsExcluded) {
-  MapRows rows = TwinRooms();
+  MapRows rows = RoomsAlike(2);
   Random random(11);
   for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
     for (int d = 0; d < kDescriptorDim; ++d) {

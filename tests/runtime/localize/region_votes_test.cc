@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 #include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/region_room.h"
 

@@ -6,6 +6,7 @@
 
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/region_votes.h"
+#include "runtime/track/camera_motion.h"
 
 namespace cairn {
 
@@ -17,6 +18,10 @@ struct RegionTrackerOptions {
   double step_sigma_deg = 8;
   // A prediction less certain than this is not used: the robot is lost.  REQUIRES: > 0
   double max_prior_sigma_m = 0.6;
+  // By odometry, too, a prediction is no more certain than this: fixes err more than they say.  REQUIRES: > 0
+  double min_prior_sigma_m = 0.05;
+  double min_prior_sigma_deg = 2;
+  WheelErrorOptions wheels;
   // A tracked fix lies within this many standard deviations of the prediction.  REQUIRES: > 0
   double max_num_sigmas = 4;
   // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
@@ -25,22 +30,29 @@ struct RegionTrackerOptions {
   // When it is lost.
   VoteOptions votes;
 };
-// Without those of the vote, which have a table of their own.
+// Without those of the vote, which have a table of their own; with those of odometry.
 OptionTable DescribeOptions(RegionTrackerOptions* options);
 
 // Finds where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
-// landmarks of its region and of the regions around that the motion so far (constant velocity, less certain
-// with every frame) predicts to be in view; a fix far from the prediction does not count.  When that fails,
-// all visible landmarks vote for the regions that they belong to (region_votes.h), and those of the regions
-// with the most votes are matched; where these give no sure fix, the frame is localized as if it were the
-// first. The latter two do not use earlier frames: a kidnapped robot is found again.  A region of four
-// landmarks can be voted for, but a fix needs seven inliers (AcceptOptions::min_num_inliers): of several such
-// regions, or of none.  Maps of more landmarks than fall_back_max_num_landmarks have no vote.  One per
+// landmarks of its region and of the regions around that the motion so far (odometry, or a constant velocity,
+// less certain with every frame) predicts to be in view; a fix far from the prediction does not count.  When
+// that fails, all visible landmarks vote for the regions that they belong to (region_votes.h), and those of
+// the regions with the most votes are matched; where these give no sure fix, the frame is localized as if it
+// were the first. The latter two do not use earlier frames: a kidnapped robot is found again.  A region of
+// four landmarks can be voted for, but a fix needs seven inliers (AcceptOptions::min_num_inliers): of several
+// such regions, or of none.  Maps of more landmarks than fall_back_max_num_landmarks have no vote.  One per
 // camera; the map is shared.
 class RegionTracker {
  public:
   explicit RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options = {},
                          const RegionTrackerOptions& options = {});
+
+  // How the camera moved since the last frame; several add up.  Over the floor: metres ahead and to the left,
+  // in the frame that the camera had on it, and a turn to the left, in a map in metres whose floor is known.
+  // Errors: as CheckUncertainPose; InvalidArgument (not finite), Unsupported (a map whose unit is not the
+  // metre).
+  Status Move(const UncertainPose& next_from_last);
+  Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
 
   // The next frame; scope kTrack: found by the prediction.  The same frames, the same results.
   // Errors: as Localizer::Localize; the state is then as before.  No exception leaves it.
@@ -49,6 +61,9 @@ class RegionTracker {
 
   // Where the next frame is expected; none when lost.
   std::optional<PosePrior> Prediction() const;
+  // Where the camera was at the last frame: its fix, or where it moved since the last one, however uncertain
+  // that is; and after Move, where it is now.  None before the first fix.
+  std::optional<UncertainPose> Believed() const;
 
  private:
   Result<Localization> TrackQuery(const Query& query);
@@ -58,14 +73,18 @@ class RegionTracker {
   Result<Vote> VoteBy(const Query& query) const;
   Result<Localization> FindLost(const Query& query) const;
   bool Agrees(const Localization& found, const PosePrior& prior) const;
+  // With the step to the next frame, where nobody told it.
+  std::optional<MotionSinceFix> MotionToNext() const;
   void Update(const Localization& found);
 
   std::shared_ptr<const Map> map_;
   Localizer localizer_;
   RegionTrackerOptions options_;
-  std::optional<Pose> last_;  // cam_from_world of the last fix
-  Pose step_;                 // from each frame's camera to the next one's
+  Pose last_, step_;  // of the last fix; from each frame's camera to the next one's
   RegionIdx region_ = -1;
+  // Since the last fix.  These are of the map's camera frame.
+  std::optional<MotionSinceFix> motion_;
+  bool was_told_ = false;     // how it moved since the last frame
   int num_frames_since_ = 0;  // the last fix
 };
 

@@ -1,4 +1,4 @@
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

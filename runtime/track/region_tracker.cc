@@ -1,4 +1,4 @@
-#include "runtime/localize/region_tracker.h"
+#include "runtime/track/region_tracker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +8,13 @@
 #include "core/base/no_throw.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {
-
 OptionTable DescribeOptions(RegionTrackerOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "step_sigma_m",
        .value = &o->step_sigma_m,
        .help = "standard deviation of the change of motion from frame to frame, m",
@@ -27,6 +27,14 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .value = &o->max_prior_sigma_m,
        .help = "predictions less certain than this are not used, m",
        .min = 1e-6},
+      {.name = "min_prior_sigma_m",
+       .value = &o->min_prior_sigma_m,
+       .help = "least standard deviation of a prediction by odometry, m",
+       .min = 1e-6},
+      {.name = "min_prior_sigma_deg",
+       .value = &o->min_prior_sigma_deg,
+       .help = "the same of rotation, degrees",
+       .min = 1e-6},
       {.name = "max_num_sigmas",
        .value = &o->max_num_sigmas,
        .help = "a tracked fix lies within this many standard deviations of the prediction",
@@ -36,6 +44,8 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .help = "most regions besides its own whose landmarks are looked for",
        .min = 0},
   };
+  for (Option& option : DescribeOptions(&o->wheels)) table.push_back(std::move(option));
+  return table;
 }
 
 RegionTracker::RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
@@ -56,16 +66,57 @@ Result<Localization> RegionTracker::TrackFeatures(Features features, const Camer
   });
 }
 
+Status RegionTracker::Move(const UncertainPose& next_from_last) {
+  CAIRN_RETURN_IF_ERROR(CheckUncertainPose(next_from_last));
+  was_told_ = true;
+  if (motion_) motion_->Add(next_from_last);
+  return Ok();
+}
+
+Status RegionTracker::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
+  if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
+    return MakeError(ErrorCode::kInvalidArgument, "odometry: a way or a turn that is no number");
+  const MapHead& head = map_->head();
+  if (!IsMetric(head.frame)) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "odometry is in metres, and the unit of map '{}' is not known; leave the odometry out",
+                     head.name);
+  }
+  was_told_ = true;
+  if (motion_) motion_->Add(FloorMotion{way_m, turn_left_rad}, head.floor_from_world, options_.wheels);
+  return Ok();
+}
+
+std::optional<MotionSinceFix> RegionTracker::MotionToNext() const {
+  std::optional<MotionSinceFix> motion = motion_;
+  if (motion && !was_told_) motion->AddUnknown(step_, options_.step_sigma_m, options_.step_sigma_deg);
+  return motion;
+}
+
 std::optional<PosePrior> RegionTracker::Prediction() const {
-  if (!last_) return std::nullopt;
-  const int num_steps = num_frames_since_ + 1;
+  const std::optional<MotionSinceFix> motion = MotionToNext();
+  if (!motion) return std::nullopt;
   PosePrior prior;
-  prior.sigma_m = options_.step_sigma_m * num_steps;
-  prior.sigma_deg = options_.step_sigma_deg * num_steps;
+  prior.cam_from_world = map_->head().camera_from_given.Inverse() * motion->cam_from_world();
+  if (motion->is_told()) {
+    const Matrix6d covariance = motion->Predict(options_.wheels).covariance;
+    prior.sigma_m = std::max(options_.min_prior_sigma_m, LargestSigma(covariance.bottomRightCorner<3, 3>()));
+    prior.sigma_deg =
+        std::max(options_.min_prior_sigma_deg, DegFromRad(LargestSigma(covariance.topLeftCorner<3, 3>())));
+  } else {  // how well the last fix was known is little beside
+    prior.sigma_m = motion->unknown_sigma_m();
+    prior.sigma_deg = motion->unknown_sigma_deg();
+  }
   if (prior.sigma_m > options_.max_prior_sigma_m) return std::nullopt;
-  prior.cam_from_world = *last_;
-  for (int i = 0; i < num_steps; ++i) prior.cam_from_world = step_ * prior.cam_from_world;
   return prior;
+}
+
+std::optional<UncertainPose> RegionTracker::Believed() const {
+  if (!motion_) return std::nullopt;
+  const Pose given_from_camera = map_->head().camera_from_given.Inverse();
+  UncertainPose believed = motion_->Predict(options_.wheels);
+  return UncertainPose{given_from_camera * believed.pose,
+                       TransformCovariance(given_from_camera, believed.covariance)};
 }
 
 Result<Localization> RegionTracker::TrackQuery(const Query& query) {
@@ -169,12 +220,18 @@ bool RegionTracker::Agrees(const Localization& found, const PosePrior& prior) co
 
 void RegionTracker::Update(const Localization& found) {
   if (!found.has_fix()) {
+    motion_ = MotionToNext();
+    was_told_ = false;
     ++num_frames_since_;
     return;
   }
+  const Pose& camera_from_given = map_->head().camera_from_given;
+  const Pose cam_from_world = camera_from_given * found.cam_from_world;
   const bool is_next = found.scope == Scope::kTrack && num_frames_since_ == 0;
-  step_ = is_next ? found.cam_from_world * last_->Inverse() : Pose();
-  last_ = found.cam_from_world;
+  step_ = is_next ? cam_from_world * last_.Inverse() : Pose();
+  last_ = cam_from_world;
+  motion_.emplace(cam_from_world, TransformCovariance(camera_from_given, found.covariance));
+  was_told_ = false;
   region_ = found.region;
   num_frames_since_ = 0;
 }
