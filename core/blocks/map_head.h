@@ -20,7 +20,8 @@ inline constexpr const char* kPromiseAlgorithm = "promise";
 struct MapHead {
   std::string name;
   std::string writer;  // program and version, "cairn 0.1.0"
-  // Of the processor that extracted the features: with another set the last bits may differ.
+  // Of the processor that extracted the features, in maps of programs whose SIFT differed between them in the
+  // last bits.
   std::string instruction_set;
   uint64_t seed = 0;    // of the compilation
   bool sealed = false;  // checked, with its self-test figures

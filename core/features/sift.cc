@@ -2,28 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <vector>
 
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "core/sift/find_sift.h"
 
 namespace cairn {
 namespace {
 
-// OpenCV's SIFT keeps 5 pixels of the doubled image away from its border.
+// No keypoint is in the 5 pixels at the border of the doubled image.
 constexpr int kMinImageSide = 6;
-
-// RootSIFT [Arandjelovic & Zisserman 2012], quantised as COLMAP's FeatureDescriptorsToUnsignedByte.
-void RootSiftRow(const float* sift, uint8_t* row) {
-  float l1 = 0;
-  for (int d = 0; d < kDescriptorDim; ++d) l1 += sift[d];
-  const float scale = l1 > 0 ? 1.0f / l1 : 0.0f;
-  for (int d = 0; d < kDescriptorDim; ++d) {
-    row[d] = static_cast<uint8_t>(std::min(255.0f, std::round(512.0f * std::sqrt(sift[d] * scale))));
-  }
-}
+static_assert(kSiftDim == kDescriptorDim);
 
 // Features of the image made smaller by `ratio`, in the pixels of the whole one.  With pixels counted from
 // the image's corner, a position in one is a multiple of that in the other.
@@ -97,57 +87,18 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
     return ExtractFromSmaller(grey, options, mask,
                               static_cast<double>(options.max_image_side_px) / longer_side);
   }
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;
-  try {
-    // OpenCV's own limit keeps all that are as strong as the weakest one kept.  Ours follows, in a fixed
-    // order, but OpenCV's saves computing the other descriptors.  OpenCV applies its limit before the mask,
-    // so it is not used with a mask.
-    const int cap = mask.empty() ? options.max_num_features : 0;
-    cv::SIFT::create(cap, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
-        ->detectAndCompute(grey, mask, keypoints, descriptors);
-  } catch (const cv::Exception& exception) {
-    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault
-    return MakeError(ErrorCode::kFailed, "SIFT failed on an image of {} x {} px: {}", grey.cols, grey.rows,
-                     exception.err);
-  }
-  const auto place = [&](int i) {
-    const cv::KeyPoint& k = keypoints[i];
-    return std::tuple(k.pt.y, k.pt.x, k.size, k.angle, i);
-  };
-  std::vector<int> order(keypoints.size());
-  std::iota(order.begin(), order.end(), 0);
-  if (order.size() > static_cast<size_t>(options.max_num_features)) {
-    std::sort(order.begin(), order.end(), [&](int a, int b) {
-      const float response_a = keypoints[a].response, response_b = keypoints[b].response;
-      return response_a != response_b ? response_a > response_b : place(a) < place(b);
-    });
-    order.resize(options.max_num_features);
-  }
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
-
-  features.descriptors.resize(static_cast<Eigen::Index>(order.size()), kDescriptorDim);
-  features.keypoints.reserve(order.size());
-  for (const int i : order) {
-    const cv::KeyPoint& k = keypoints[i];
-    RootSiftRow(descriptors.ptr<float>(i),
-                features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
-    features.keypoints.push_back(KeypointFromOpenCv(k.pt.x, k.pt.y, k.size, k.angle));
+  const std::vector<SiftFeature> found = FindSift(grey, mask,
+                                                  {.max_num_features = options.max_num_features,
+                                                   .contrast_threshold = options.contrast_threshold,
+                                                   .edge_threshold = options.edge_threshold});
+  features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kDescriptorDim);
+  features.keypoints.reserve(found.size());
+  for (const SiftFeature& feature : found) {
+    std::copy(feature.root_sift.begin(), feature.root_sift.end(),
+              features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
+    features.keypoints.push_back(KeypointFromOpenCv(feature.x, feature.y, feature.size, feature.angle_deg));
   }
   return features;
-}
-
-std::string SiftInstructionSet() {
-#if defined(__x86_64__)
-  const char* const best = cv::checkHardwareSupport(CV_CPU_AVX512_SKX) ? " avx512"
-                           : cv::checkHardwareSupport(CV_CPU_AVX2)     ? " avx2"
-                                                                       : " sse2";
-  return std::string("x86-64") + best;
-#elif defined(__aarch64__)
-  return "aarch64";
-#else
-  return "other";
-#endif
 }
 
 }  // namespace cairn

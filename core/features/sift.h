@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include <opencv2/core/mat.hpp>
 
 #include "core/base/error.h"
@@ -10,32 +8,28 @@
 
 namespace cairn {
 
-// SIFT with RootSIFT descriptors, through OpenCV.  The same function serves the survey and a robot's query.
+// SIFT with RootSIFT descriptors (core/sift).  The same function serves the survey and a robot's query.
 struct SiftOptions {
   // Most features per image; the strongest are kept.  REQUIRES: in [1, 1000000]
   int max_num_features = 2000;
   // Images with a longer side are made smaller before, and their keypoints larger again: the pyramid takes
-  // about 240 bytes for each pixel (1.8 GB for 3200 x 2400 px) in every thread [COLMAP: 3200].
+  // about 75 bytes for each pixel (580 MB for 3200 x 2400 px) in every thread [COLMAP: 3200].
   // REQUIRES: in [64, 65536]
   int max_image_side_px = 3200;
-  // Least contrast of an extremum (OpenCV's contrastThreshold, divided by the layers).  REQUIRES: in [0, 1]
+  // Least contrast of an extremum times the layers (OpenCV's contrastThreshold).  REQUIRES: in [0, 1]
   double contrast_threshold = 0.02;
   // Largest ratio of principal curvatures (edges).  REQUIRES: >= 1
   double edge_threshold = 10;
 };
 OptionTable DescribeOptions(SiftOptions* options);
 
-// Features of an 8-bit grey image, ordered by (y, x, scale, orientation): deterministic.  `mask`, if not
-// empty, has the image's size; features at zero pixels are dropped.  A blank or tiny image gives no features,
-// not an error.  Errors: InvalidArgument for an image or mask of another type or size.
+// Features of an 8-bit grey image, ordered by (y, x, scale, orientation): the same bits on every processor.
+// `mask`, if not empty, has the image's size; features at zero pixels are dropped.  A blank or tiny image
+// gives no features, not an error.  Errors: InvalidArgument for an image or mask of another type or size.
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask = {});
 
 // OpenCV's keypoint position in COLMAP's pixels: half a pixel for the pixel's centre, minus the quarter that
 // OpenCV 4.6's SIFT adds when it starts from the doubled image.
 Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg);
-
-// The instruction set of this processor that OpenCV's SIFT uses, for example "x86-64 avx2": the last bits of
-// features differ between them.
-std::string SiftInstructionSet();
 
 }  // namespace cairn

@@ -226,6 +226,9 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
                {{"sessions", fmt::format("{}", fmt::join(head.sessions, " "))}});
   }
+  if (!head.instruction_set.empty()) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"instruction_set", head.instruction_set}});
+  }
   if (head.documents != "all") {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"documents", head.documents}});
   }
@@ -237,7 +240,6 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
              {{"name", head.name},
               {"writer", head.writer},
-              {"instruction_set", head.instruction_set},
               {"seed", std::to_string(head.seed)},
               {"sealed", head.sealed ? "1" : "0"},
               {"landmarks", head.landmark_choice},

@@ -8,10 +8,10 @@
 #include "core/base/error.h"
 #include "core/camera/camera.h"
 #include "runtime/c_api/cairn.h"
-#include "runtime/track/camera_motion.h"
 #include "runtime/localize/localization.h"
 #include "runtime/map/map.h"
 #include "runtime/map/update_map.h"
+#include "runtime/track/camera_motion.h"
 #include "runtime/visual_map/visual_estimate.h"
 
 // Between the structs of the C API and the runtime's types.

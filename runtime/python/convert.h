@@ -10,8 +10,8 @@
 #include <pybind11/pybind11.h>
 
 #include "core/seal/signing_key.h"
-#include "runtime/track/camera_motion.h"
 #include "runtime/localize/localizer.h"
+#include "runtime/track/camera_motion.h"
 
 // Between Python's values and the runtime's.
 namespace cairn {

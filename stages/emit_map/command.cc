@@ -15,7 +15,6 @@
 #include <spdlog/spdlog.h>
 
 #include "core/capture/sessions.h"
-#include "core/features/sift.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/files/temporary.h"
@@ -63,7 +62,6 @@ Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   MapHead head;
   head.name = arguments.name;
   head.writer = std::string("cairn ") + ProgramVersion();
-  head.instruction_set = SiftInstructionSet();
   head.seed = seed;
   for (const auto& [name, path] : {std::pair("classes.db", arguments.files.classes_path),
                                    std::pair("world.db", arguments.files.world_path),

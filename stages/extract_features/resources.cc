@@ -10,9 +10,10 @@
 namespace cairn::extract_features {
 namespace {
 
-// SIFT doubles an image and keeps 6 blurred copies and 5 differences of each octave, of 4 bytes a pixel: 4 *
-// 4 * 11 * 4/3 bytes per pixel of the image; its own grey values and the file come on top.
-constexpr int64_t kPyramidBytesPerPixel = 240;
+// SIFT doubles an image and keeps 3 blurred copies of each octave, of 4 bytes a pixel, and a few rows of
+// others: 4 * 4 * 3 * 4/3 bytes per pixel of the image, and an eighth of them; its own grey values and the
+// file come on top.
+constexpr int64_t kPyramidBytesPerPixel = 76;
 constexpr int64_t kImageBytesPerPixel = 8;
 constexpr int64_t kBytesPerKeypoint = kDescriptorDim + sizeof(Keypoint);
 // SIFT finds at most one keypoint per this many pixels.

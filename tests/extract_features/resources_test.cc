@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// 100 images of 1000 x 1000 px: 240 + 8 bytes a pixel are 236.5 MiB a thread; batches of 64 images with 1000
+// 100 images of 1000 x 1000 px: 76 + 8 bytes a pixel are 80.1 MiB a thread; batches of 64 images with 1000
 // keypoints of 144 bytes are 8.8 MiB; the program takes 64 MiB.
 Capture LargeImages() {
   Capture capture;
@@ -31,22 +31,22 @@ TEST(Resources, AsManyThreadsAsLargeImagesFit) {
   const auto threads = [](int num_threads, int64_t memory_mib) {
     return ThreadsThatFit(LargeImages(), ThousandKeypoints(), num_threads, memory_mib).value();
   };
-  EXPECT_EQ(threads(8, 310), 1);
-  EXPECT_EQ(threads(8, 545), 1);
-  EXPECT_EQ(threads(8, 546), 2);
+  EXPECT_EQ(threads(8, 153), 1);
+  EXPECT_EQ(threads(8, 233), 1);
+  EXPECT_EQ(threads(8, 234), 2);
   EXPECT_EQ(threads(8, 100000), 8);
 }
 
 TEST(Resources, NotEvenOneImageIsRefusedWithTheEstimate) {
-  const auto threads = ThreadsThatFit(LargeImages(), ThousandKeypoints(), 8, 309);
+  const auto threads = ThreadsThatFit(LargeImages(), ThousandKeypoints(), 8, 152);
   ASSERT_FALSE(threads.ok());
-  EXPECT_THAT(threads.error().message, HasSubstr("takes about 310 MiB of memory, but --memory allows 309"));
+  EXPECT_THAT(threads.error().message, HasSubstr("takes about 153 MiB of memory, but --memory allows 152"));
 }
 
 TEST(Resources, SmallerImagesForSiftTakeLess) {
   ExtractFeaturesOptions options = ThousandKeypoints();
   options.sift.max_image_side_px = 500;  // a quarter of the pixels
-  EXPECT_EQ(ThreadsThatFit(LargeImages(), options, 8, 310).value(), 3);
+  EXPECT_EQ(ThreadsThatFit(LargeImages(), options, 8, 153).value(), 3);
 }
 
 TEST(Resources, FeaturesAreEstimatedAtThreeQuartersOfThoseAllowed) {

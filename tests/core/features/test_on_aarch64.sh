@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compiles the matching kernels and their tests for 64-bit ARM and runs them in an emulator, as a processor with dot
+# Compiles the kernels of matching and of SIFT and their tests for 64-bit ARM and runs them in an emulator, as a processor with dot
 # products and as one without:  test_on_aarch64.sh SOURCE EIGEN WORK
 # Exit 77: skipped, since the cross compiler, the emulator or GoogleTest's sources are not installed.
 set -euo pipefail
@@ -19,6 +19,11 @@ compile "$source/core/features/best_two_neon_dot.cc" -march=armv8.2-a+dotprod -W
 for file in core/features/best_two_portable.cc core/features/descriptor_matcher.cc core/features/packed_descriptors.cc \
   tests/core/features/best_two_sweep_test.cc tests/core/features/descriptor_matcher_test.cc; do
   compile "$source/$file" -Wall -Wextra -Werror
+done
+sift_flags=(-O3 -fno-math-errno -fno-trapping-math -Wall -Wextra -Werror)
+for file in core/sift/sift_kernels_portable.cc core/sift/choose_kernels.cc core/sift/gaussian.cc tests/core/sift/wide_kernels.cc \
+  tests/core/sift/sift_kernels_test.cc tests/core/sift/gaussian_test.cc; do
+  compile "$source/$file" "${sift_flags[@]}"
 done
 for file in gtest-all gtest_main; do compile "$googletest/src/$file.cc" -I"$googletest"; done
 "$compiler" -static "$work"/*.o -o "$work/matcher_test"

@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/track/region_tracker.h"
 #include "runtime/map/landmark_set.h"
+#include "runtime/track/region_tracker.h"
 #include "tests/runtime/localize/region_room.h"
 
 namespace cairn {

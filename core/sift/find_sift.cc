@@ -1,0 +1,261 @@
+#include "core/sift/find_sift.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "core/sift/gaussian.h"
+#include "core/sift/octave.h"
+#include "core/sift/sift_memory.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kOctaveBorder = 5;  // pixels without keypoints, as OpenCV
+constexpr size_t kMaxFloatsKept = size_t{64} << 18;
+
+// The image's pixel is 2^(1 - octave) of the octave's.
+float ImageScale(int octave) { return std::ldexp(0.5f, octave); }
+
+cv::Rect Grown(const cv::Rect& rect, int by, cv::Size within) {
+  return cv::Rect(rect.x - by, rect.y - by, rect.width + 2 * by, rect.height + 2 * by) &
+         cv::Rect({0, 0}, within);
+}
+
+// The part of an octave where keypoints of a region of the image begin.
+cv::Rect SoughtIn(int octave, cv::Size size, const cv::Rect& region) {
+  const cv::Rect inside(kOctaveBorder, kOctaveBorder, size.width - 2 * kOctaveBorder,
+                        size.height - 2 * kOctaveBorder);
+  if (inside.width <= 0 || inside.height <= 0) return {};
+  if (region.empty()) return inside;
+  const double scale = 1 / ImageScale(octave);
+  // A pixel for the quarter and the half that positions are off, one for rounding, and the drift.
+  constexpr int kSlack = kSiftMaxDrift + 3;
+  const auto from = [&](int at) { return static_cast<int>(std::floor(at * scale)) - kSlack; };
+  const auto to = [&](int at) { return static_cast<int>(std::ceil(at * scale)) + kSlack; };
+  return cv::Rect(cv::Point(from(region.x), from(region.y)),
+                  cv::Point(to(region.br().x), to(region.br().y))) &
+         inside;
+}
+
+// Octaves from the first to the last that is searched, with what the later ones need of the earlier.
+std::vector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, const SiftSearch& search) {
+  std::vector<OctavePlan> plans;
+  cv::Size size = image * 2;
+  for (int o = 0; o < std::min(NumOctaves(image), search.end_octave); ++o, size = size / 2) {
+    if (std::min(size.width, size.height) <= 2 * kOctaveBorder) break;
+    const cv::Rect sought = o < search.first_octave ? cv::Rect() : SoughtIn(o, size, region);
+    plans.push_back({.octave = o, .size = size, .sought = sought});
+  }
+  cv::Rect needed;  // of this octave by the next one
+  for (auto plan = plans.rbegin(); plan != plans.rend(); ++plan) {
+    const cv::Rect own =
+        plan->sought.empty() ? cv::Rect() : Grown(plan->sought, kSiftSearchReach, plan->size);
+    plan->window = own | needed;
+    if (plan->octave == 0) {
+      // From a pixel of the image to a pixel of the image, and the reach of the first Gaussian.
+      plan->window = Grown(plan->window, 6, plan->size);
+      const int right = (plan->window.br().x + 1) & ~1, bottom = (plan->window.br().y + 1) & ~1;
+      plan->window.x &= ~1;
+      plan->window.y &= ~1;
+      plan->window.width = right - plan->window.x;
+      plan->window.height = bottom - plan->window.y;
+    } else if (!plan->window.empty()) {
+      const cv::Rect& w = plan->window;
+      needed = Grown({2 * w.x, 2 * w.y, 2 * w.width, 2 * w.height}, kSiftLevelReach + 1, (plan + 1)->size);
+    }
+  }
+  while (!plans.empty() && plans.back().sought.empty()) plans.pop_back();
+  return plans;
+}
+
+bool SamePlace(const SiftExtremum& a, const SiftExtremum& b) {
+  return a.octave == b.octave && a.layer == b.layer && a.x == b.x && a.y == b.y;
+}
+
+// Extrema in the region and the mask, each once, ordered by place.
+void SelectExtrema(const cv::Mat& mask, const cv::Rect& region, std::vector<SiftExtremum>* extrema) {
+  std::erase_if(*extrema, [&](const SiftExtremum& e) {
+    const float x = e.octave_x * ImageScale(e.octave), y = e.octave_y * ImageScale(e.octave);
+    if (!region.empty() && !(x >= static_cast<float>(region.x) && x < static_cast<float>(region.br().x) &&
+                             y >= static_cast<float>(region.y) && y < static_cast<float>(region.br().y)))
+      return true;
+    return !mask.empty() && mask.at<uint8_t>(static_cast<int>(y + 0.5f), static_cast<int>(x + 0.5f)) == 0;
+  });
+  std::sort(extrema->begin(), extrema->end(), [](const SiftExtremum& a, const SiftExtremum& b) {
+    return std::tie(a.octave, a.layer, a.y, a.x) < std::tie(b.octave, b.layer, b.y, b.x);
+  });
+  extrema->erase(std::unique(extrema->begin(), extrema->end(), SamePlace), extrema->end());
+}
+
+SiftPatch PatchOf(const Octave& octave, int layer, int x, int y) {
+  return {.level = octave.Row(layer, 0),
+          .stride = octave.stride(),
+          .cols = octave.window().width,
+          .rows = octave.window().height,
+          .x = x - octave.window().x,
+          .y = y - octave.window().y};
+}
+
+// A keypoint in the image, as OpenCV states it (SiftFeature).
+struct Oriented {
+  SiftExtremum extremum;
+  float x = 0;
+  float y = 0;
+  float size = 0;
+  float angle_deg = 0;
+};
+
+auto PlaceOf(const Oriented& o) { return std::tie(o.y, o.x, o.size, o.angle_deg); }
+
+using PatchWeights = std::array<float, kSiftMaxPatchRadius + 1>;
+
+// The smoothed histogram of directions around a keypoint, with one more value before it and behind it.
+std::array<float, kSiftDirections + 2> SmoothHistogram(const Octave& octave, const SiftExtremum& extremum,
+                                                       const SiftKernels& kernels) {
+  SiftPatch patch = PatchOf(octave, extremum.layer, extremum.x, extremum.y);
+  const float sigma = 1.5f * extremum.octave_sigma;
+  patch.radius = static_cast<int>(std::nearbyint(4.5f * extremum.octave_sigma));
+  PatchWeights weights;
+  GaussianWeights(sigma * sigma, patch.radius, weights.data());
+  patch.weights = weights.data();
+  float sums[kSiftDirections + 6];  // three of the other end at either end
+  float* first = sums + 3;
+  kernels.orientation_histogram(patch, first);
+  for (int b = 0; b < 3; ++b) {
+    sums[b] = first[kSiftDirections - 3 + b];
+    first[kSiftDirections + b] = first[b];
+  }
+  std::array<float, kSiftDirections + 2> smooth;
+  for (int b = -1; b <= kSiftDirections; ++b) {
+    smooth[b + 1] = (first[b - 2] + first[b + 2]) * (1 / 16.0f) +
+                    (first[b - 1] + first[b + 1]) * (4 / 16.0f) + first[b] * (6 / 16.0f);
+  }
+  return smooth;
+}
+
+// A keypoint for each of the histogram's peaks [Lowe04 §5].
+void AddOriented(const Octave& octave, const SiftExtremum& extremum, const SiftKernels& kernels,
+                 std::vector<Oriented>* oriented) {
+  const auto smooth = SmoothHistogram(octave, extremum, kernels);
+  const float least = 0.8f * *std::max_element(smooth.begin(), smooth.end());
+  const float scale = ImageScale(extremum.octave);
+  for (int b = 0; b < kSiftDirections; ++b) {
+    const float before = smooth[b], here = smooth[b + 1], after = smooth[b + 2];
+    if (!(here > before && here > after && here >= least)) continue;
+    // The vertex of the parabola through the three.
+    float place = static_cast<float>(b) + 0.5f * (before - after) / (before - 2 * here + after);
+    if (place < 0) place += kSiftDirections;
+    const float angle = 360.0f - 360.0f / kSiftDirections * place;
+    oriented->push_back({.extremum = extremum,
+                         .x = extremum.octave_x * scale,
+                         .y = extremum.octave_y * scale,
+                         .size = 2 * extremum.octave_sigma * scale,
+                         .angle_deg = angle >= 360.0f ? 0.0f : angle});
+  }
+}
+
+// The strongest features, those as strong as the weakest one in the order of their places.  Orientations
+// are found only as far down as they are needed.
+std::vector<Oriented> OrientStrongest(const std::vector<Octave>& octaves, std::vector<SiftExtremum> extrema,
+                                      size_t max_num, const SiftKernels& kernels) {
+  if (extrema.size() > max_num) {
+    std::stable_sort(extrema.begin(), extrema.end(),
+                     [](const SiftExtremum& a, const SiftExtremum& b) { return a.response > b.response; });
+  }
+  std::vector<Oriented> oriented;
+  oriented.reserve(std::min(extrema.size(), max_num) + extrema.size() / 4);
+  size_t num_done = 0;
+  while (num_done < extrema.size() && oriented.size() < max_num) {
+    size_t end = std::min(extrema.size(), num_done + max_num - oriented.size());
+    while (end < extrema.size() && extrema[end].response == extrema[end - 1].response) ++end;
+    for (; num_done < end; ++num_done)
+      AddOriented(octaves[extrema[num_done].octave], extrema[num_done], kernels, &oriented);
+  }
+  if (oriented.size() > max_num) {
+    std::nth_element(oriented.begin(), oriented.begin() + static_cast<int64_t>(max_num), oriented.end(),
+                     [](const Oriented& a, const Oriented& b) {
+                       return a.extremum.response != b.extremum.response
+                                  ? a.extremum.response > b.extremum.response
+                                  : PlaceOf(a) < PlaceOf(b);
+                     });
+    oriented.resize(max_num);
+  }
+  std::sort(oriented.begin(), oriented.end(),
+            [](const Oriented& a, const Oriented& b) { return PlaceOf(a) < PlaceOf(b); });
+  return oriented;
+}
+
+void Describe(const Octave& octave, const Oriented& oriented, const SiftKernels& kernels,
+              uint8_t* root_sift) {
+  const SiftExtremum& extremum = oriented.extremum;
+  SiftPatch patch = PatchOf(octave, extremum.layer, static_cast<int>(std::nearbyint(extremum.octave_x)),
+                            static_cast<int>(std::nearbyint(extremum.octave_y)));
+  const float cell = 3 * extremum.octave_sigma;
+  patch.radius = static_cast<int>(std::nearbyint(cell * 1.41421356f * (kSiftCells + 1) * 0.5f));
+  // A Gaussian of half the descriptor's width [Lowe04 §6.1].
+  const float sigma = cell * kSiftCells / 2;
+  PatchWeights weights;
+  GaussianWeights(sigma * sigma, patch.radius, weights.data());
+  patch.weights = weights.data();
+  const float angle_deg = oriented.angle_deg == 0 ? 0.0f : 360.0f - oriented.angle_deg;
+  const SineCosine turn = ExactSineCosine(angle_deg);
+  patch.cosine = static_cast<float>(turn.cosine) / cell;
+  patch.sine = static_cast<float>(turn.sine) / cell;
+  patch.orientation = angle_deg * (kSiftCellDirections / 360.0f);
+  kernels.describe(patch, root_sift);
+}
+
+// Descriptors of keypoints, octave by octave, as neighbours share what is in the caches.
+std::vector<SiftFeature> DescribeAll(const std::vector<Octave>& octaves,
+                                     const std::vector<Oriented>& oriented, const SiftKernels& kernels) {
+  std::vector<SiftFeature> features(oriented.size());
+  for (const Octave& octave : octaves) {
+    for (size_t i = 0; i < oriented.size(); ++i) {
+      const Oriented& o = oriented[i];
+      if (o.extremum.octave != octave.plan().octave) continue;
+      features[i] = {.x = o.x,
+                     .y = o.y,
+                     .size = o.size,
+                     .angle_deg = o.angle_deg,
+                     .response = o.extremum.response,
+                     .octave = o.extremum.octave};
+      Describe(octave, o, kernels, features[i].root_sift.data());
+    }
+  }
+  return features;
+}
+
+}  // namespace
+
+std::vector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
+                                  const SiftKernels& kernels) {
+  thread_local SiftMemory memory;
+  const cv::Rect region = search.region & cv::Rect({0, 0}, grey.size());
+  if (region.empty() && !search.region.empty()) return {};
+  const std::vector<OctavePlan> plans = PlanOctaves(grey.size(), region, search);
+  size_t num_floats = 0;
+  for (const OctavePlan& plan : plans) num_floats += Octave::NumFloats(plan);
+  float* next = memory.Take(num_floats);
+  std::vector<Octave> octaves;
+  octaves.reserve(plans.size());
+  std::vector<SiftExtremum> extrema;
+  const SiftThresholds thresholds{search.contrast_threshold, search.edge_threshold};
+  for (const OctavePlan& plan : plans) {
+    Octave& octave = octaves.emplace_back(plan, next, kernels);
+    next += Octave::NumFloats(plan);
+    if (plan.octave == 0) {
+      octave.Sweep(grey, thresholds, &extrema);
+    } else {
+      octave.Sweep(octaves[plan.octave - 1], thresholds, &extrema);
+    }
+  }
+  SelectExtrema(mask, region, &extrema);
+  const std::vector<Oriented> oriented =
+      OrientStrongest(octaves, std::move(extrema), static_cast<size_t>(search.max_num_features), kernels);
+  std::vector<SiftFeature> features = DescribeAll(octaves, oriented, kernels);
+  memory.Trim(kMaxFloatsKept);
+  return features;
+}
+
+}  // namespace cairn

@@ -1,0 +1,208 @@
+#include "core/sift/octave.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/sift/gaussian.h"
+#include "core/sift/refine_extremum.h"
+
+namespace cairn {
+namespace {
+
+constexpr double kSquaredSigma = 1.6 * 1.6;  // of level 0 [Lowe04 §3.3]
+// The image's own blur, sigma 0.5 px, which is 1 px of the doubled image [Lowe04 §3.3].
+constexpr double kSquaredDoubledSigma = 1.0;
+constexpr double kSquaredLevelRatio = 1.5874010519681994748;  // 2^(2 / kSiftLayers)
+
+// Radii of the Gaussians that lead to each level, the first from the doubled image: 4 sigma, rounded as
+// OpenCV rounds the whole width.
+constexpr std::array<int, kSiftLevels> kRadii = {5, 5, 6, 8, 10, 13};
+static_assert(kRadii[1] + kRadii[2] + kRadii[3] == kSiftLevelReach);
+static_assert(kSiftLevelReach + kRadii[4] + kRadii[5] == kSiftTopReach);
+
+// Rows kept of each level, powers of two: those that the next level and a refinement still need.  0: all.
+constexpr std::array<int, kSiftLevels> kRowsKept = {64, 0, 0, 0, 64, 32};
+constexpr int kDoubledRowsKept = 32;
+constexpr int kRowMargin = 64;  // floats before the first row and behind the last that kernels may read
+
+using Taps = std::array<std::array<float, kSiftMaxBlurRadius + 1>, kSiftLevels>;
+const Taps& AllTaps() {
+  static const Taps taps = [] {
+    Taps all;
+    all[0] = GaussianTaps(kSquaredSigma - kSquaredDoubledSigma, kRadii[0]);
+    double squared_sigma = kSquaredSigma;  // of the level before
+    for (int l = 1; l < kSiftLevels; ++l) {
+      all[l] = GaussianTaps(squared_sigma * kSquaredLevelRatio - squared_sigma, kRadii[l]);
+      squared_sigma *= kSquaredLevelRatio;
+    }
+    return all;
+  }();
+  return taps;
+}
+
+// Whole blocks, and a few floats so that rows do not fall on the same places of a cache.
+int64_t StrideOf(int cols) {
+  return (cols + kSiftRowBlock - 1) / kSiftRowBlock * int64_t{kSiftRowBlock} + 16;
+}
+
+int64_t NumRowsKept(const OctavePlan& plan, int level) {
+  return kRowsKept[level] == 0 ? plan.window.height : kRowsKept[level];
+}
+
+// As many as a search of some rows may find, in whole cache lines.
+int64_t NumCandidates(const OctavePlan& plan) { return kSiftBatchRows * StrideOf(plan.window.width); }
+
+int MirroredRow(int y, int rows) {
+  while (y < 0 || y >= rows) y = y < 0 ? -y : 2 * (rows - 1) - y;
+  return y;
+}
+
+// The greatest integer not above threshold / 2 in grey levels, as OpenCV: only what is above it is an
+// extremum.
+float SearchThreshold(double contrast) {
+  return static_cast<float>(std::floor(0.5 * contrast / kSiftLayers * 255));
+}
+
+}  // namespace
+
+size_t Octave::NumFloats(const OctavePlan& plan) {
+  int64_t rows = plan.octave == 0 ? kDoubledRowsKept : 0;
+  for (int l = 0; l < kSiftLevels; ++l) rows += NumRowsKept(plan, l);
+  const int64_t stride = StrideOf(plan.window.width);
+  // A multiple of a cache line, as are its terms.
+  return static_cast<size_t>(rows * stride + kSiftBatchRows * SiftPaddedStride(plan.window.width) +
+                             NumCandidates(plan) * sizeof(SiftCandidate) / sizeof(float) + 2 * kRowMargin);
+}
+
+Octave::Octave(const OctavePlan& plan, float* memory, const SiftKernels& kernels)
+    : plan_(plan), kernels_(kernels), stride_(StrideOf(plan.window.width)) {
+  float* next = memory + kRowMargin;
+  for (int l = 0; l < kSiftLevels; ++l) {
+    levels_[l] = {next, kRowsKept[l] == 0 ? -1 : kRowsKept[l] - 1};
+    next += NumRowsKept(plan, l) * stride_;
+  }
+  if (plan.octave == 0) {
+    doubled_ = next;
+    next += kDoubledRowsKept * stride_;
+  }
+  padded_ = next + kRowMargin;
+  next = padded_ + kSiftBatchRows * SiftPaddedStride(plan.window.width);
+  found_ = reinterpret_cast<SiftCandidate*>(next);
+}
+
+void Octave::BlurRows(int level, int y, int num) {
+  const float* rows[2 * kSiftMaxBlurRadius + kSiftBatchRows];
+  float* blurred[kSiftBatchRows];
+  const int radius = kRadii[level];
+  for (int i = 0; i < num + 2 * radius; ++i) {
+    const int from = MirroredRow(y + i - radius, plan_.window.height);
+    rows[i] = level == 0 ? doubled_ + (from % kDoubledRowsKept) * stride_ : Row(level - 1, from);
+  }
+  for (int i = 0; i < num; ++i) blurred[i] = MutableRow(level, y + i);
+  kernels_.blur_rows({.rows = rows,
+                      .blurred = blurred,
+                      .num_rows = num,
+                      .taps = AllTaps()[level].data(),
+                      .radius = radius,
+                      .cols = plan_.window.width,
+                      .padded = padded_});
+}
+
+void Octave::Sweep(const cv::Mat& grey, const SiftThresholds& thresholds,
+                   std::vector<SiftExtremum>* extrema) {
+  // The window's corner is at a pixel of the image.
+  const cv::Rect& window = plan_.window;
+  int num_doubled = 0;
+  const auto double_row = [&](int y) {
+    const int row = (y + window.y) / 2, other = (y + window.y) % 2 == 0 ? row - 1 : row + 1;
+    const auto pixels = [&](int r) {
+      return grey.ptr<uint8_t>(std::clamp(r, 0, grey.rows - 1)) + window.x / 2;
+    };
+    kernels_.double_row(pixels(row), pixels(other), window.width / 2,
+                        doubled_ + (y % kDoubledRowsKept) * stride_);
+  };
+  SweepRows(
+      [&](int y, int num) {
+        const int end = std::min(window.height, y + num + kRadii[0]);
+        while (num_doubled < end) double_row(num_doubled++);
+        BlurRows(0, y, num);
+      },
+      thresholds, extrema);
+}
+
+void Octave::Sweep(const Octave& before, const SiftThresholds& thresholds,
+                   std::vector<SiftExtremum>* extrema) {
+  const cv::Rect& window = plan_.window;
+  const int first_x = 2 * window.x - before.window().x, first_y = 2 * window.y - before.window().y;
+  SweepRows(
+      [&](int first, int num) {
+        for (int y = first; y < first + num; ++y) {
+          const float* from = before.Row(kSiftLayers, first_y + 2 * y) + first_x;
+          float* to = MutableRow(0, y);
+          for (int x = 0; x < window.width; ++x) to[x] = from[2 * x];
+        }
+      },
+      thresholds, extrema);
+}
+
+void Octave::Search(int y, int num, const SiftThresholds& thresholds,
+                    std::vector<SiftCandidate>* candidates) {
+  const cv::Rect sought = plan_.sought - plan_.window.tl();
+  const int begin = std::max(y, sought.y), end = std::min(y + num, sought.br().y);
+  if (begin >= end) return;
+  SiftExtremaRows rows{.first_row = begin,
+                       .num_rows = end - begin,
+                       .begin = sought.x,
+                       .end = sought.br().x,
+                       .threshold = SearchThreshold(thresholds.contrast)};
+  for (int l = 0; l < kSiftLevels; ++l) {
+    for (int r = 0; r < rows.num_rows + 2; ++r) rows.levels[l][r] = Row(l, begin - 1 + r);
+  }
+  const int num_found = kernels_.find_extrema(rows, found_);
+  candidates->insert(candidates->end(), found_, found_ + num_found);
+}
+
+template <typename FirstLevelRows>
+void Octave::SweepRows(const FirstLevelRows& first_level_rows, const SiftThresholds& thresholds,
+                       std::vector<SiftExtremum>* extrema) {
+  const int num_rows = plan_.window.height;
+  const int top = plan_.sought.empty() ? kSiftLayers : kSiftLevels - 1;
+  std::array<int, kSiftLevels> num_done{};
+  std::vector<SiftCandidate> candidates;
+  for (int y = 0; y < num_rows; y += kSiftBatchRows) {
+    // Rows that those of the top level need.
+    std::array<int, kSiftLevels> end{};
+    end[top] = std::min(num_rows, y + kSiftBatchRows);
+    for (int l = top; l > 0; --l) end[l - 1] = std::min(num_rows, end[l] + kRadii[l]);
+    for (int l = 0; l <= top; ++l) {
+      while (num_done[l] < end[l]) {
+        const int num = std::min(kSiftBatchRows, end[l] - num_done[l]);
+        l == 0 ? first_level_rows(num_done[0], num) : BlurRows(l, num_done[l], num);
+        num_done[l] += num;
+      }
+    }
+    if (top == kSiftLayers) continue;
+    Search(y - 1, kSiftBatchRows, thresholds, &candidates);
+    // Those whose refinement has all rows that it may read.
+    std::erase_if(candidates, [&](const SiftCandidate& candidate) {
+      if (candidate.y + kSiftMaxDrift + 1 >= end[top] && end[top] < num_rows) return false;
+      for (int layer = 1; layer <= kSiftLayers; ++layer) {
+        if ((candidate.layers >> (layer - 1) & 1) == 0) continue;
+        if (const auto extremum = RefineExtremum(*this, layer, candidate.x, candidate.y, thresholds))
+          extrema->push_back(*extremum);
+      }
+      return true;
+    });
+  }
+}
+
+int NumOctaves(cv::Size image) {
+  // round(log2(side) - 2) + 1, of the doubled image's side; log2's fraction exceeds 1/2 where side^2 >
+  // 2^(2k+1).
+  const auto side = static_cast<uint64_t>(2 * std::min(image.width, image.height));
+  const int whole = std::bit_width(side) - 1;
+  return whole + (side * side > uint64_t{2} << (2 * whole) ? 1 : 0) - 1;
+}
+
+}  // namespace cairn
