@@ -127,12 +127,12 @@ TEST(CameraOnFloor, LooksAlongItsOpticalAxis) {
 //               |
 //               |    1      The camera is 0.5 m ahead of the robot and looks to its left.
 //               +------> x
-TEST(Odometry, SaysHowTheMountedCameraMoved) {
+TEST(Odometry, SaysHowTheMountedFloorMotiond) {
   Odometry odometry(CameraMountedAt(0.5, 0, std::numbers::pi / 2));
   ASSERT_TRUE(odometry.Add(1, {{2, 1}, std::numbers::pi / 2}).ok());
   EXPECT_FALSE(odometry.MoveTo(1));  // the first image
   ASSERT_TRUE(odometry.Add(2, {{2, 3}, std::numbers::pi}).ok());
-  const std::optional<CameraMove> move = odometry.MoveTo(2);
+  const std::optional<FloorMotion> move = odometry.MoveTo(2);
   ASSERT_TRUE(move);
   // From (2, 1.5), looking along -x, to (1.5, 3).
   EXPECT_NEAR(move->way_m.x(), 0.5, 1e-12);
@@ -147,7 +147,7 @@ TEST(Odometry, TakesTheImagesTimeBetweenTwoPoses) {
   ASSERT_TRUE(odometry.Add(3, {{4, 0}, -3}).ok());  // on by 0.28 rad, past pi
   EXPECT_FALSE(odometry.MoveTo(0.5));               // before odometry began
   EXPECT_FALSE(odometry.MoveTo(1));
-  const std::optional<CameraMove> move = odometry.MoveTo(1.5);
+  const std::optional<FloorMotion> move = odometry.MoveTo(1.5);
   ASSERT_TRUE(move);
   EXPECT_NEAR(move->way_m.norm(), 1, 1e-12);
   EXPECT_NEAR(move->turn_left_rad, 0.25 * (2 * std::numbers::pi - 6), 1e-12);
