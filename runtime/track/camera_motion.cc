@@ -49,6 +49,7 @@ Status CheckUncertainPose(const UncertainPose& given) {
 }
 
 PlanarPose CameraOnFloor(const Pose& robot_from_camera) {
+  if (robot_from_camera.rotation.vec().isZero(0) && robot_from_camera.translation.isZero(0)) return {};
   const FloorPose camera = FloorPoseOf(robot_from_camera.Inverse(), Pose());
   return {camera.position, WrapAngle(RadFromDeg(camera.heading_deg))};
 }

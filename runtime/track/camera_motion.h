@@ -27,7 +27,8 @@ struct FloorMotion {
   double turn_left_rad = 0;
 };
 // Where a mounted camera is on the floor, in its robot's frame, and to where it looks: to its image's top
-// where it looks up or down.  What moves the robot moves the camera there.
+// where it looks up or down.  What moves the robot moves the camera there.  The identity says that nobody
+// stated where: above the middle of the axle, ahead.
 PlanarPose CameraOnFloor(const Pose& robot_from_camera);
 // What of a motion in space is over the floor, for a camera that looks about level.
 FloorMotion OverFloor(const Pose& next_from_last);

@@ -121,13 +121,20 @@ TEST(CameraOnFloor, LooksAlongItsOpticalAxis) {
   EXPECT_NEAR(pose.position.y(), -0.1, 1e-12);
   EXPECT_NEAR(pose.heading_rad, 0.4, 1e-12);
   EXPECT_EQ(CameraOnFloor(Pose()).heading_rad, 0);  // without a mounting
+  // One that looks up, its image's top to the robot's left.
+  Eigen::Matrix3d robot_from_camera;
+  robot_from_camera.col(0) = Eigen::Vector3d::UnitX() * -1;  // right
+  robot_from_camera.col(1) = Eigen::Vector3d::UnitY() * -1;  // down
+  robot_from_camera.col(2) = Eigen::Vector3d::UnitZ();
+  EXPECT_NEAR(CameraOnFloor({Eigen::Quaterniond(robot_from_camera), {0, 0, 1}}).heading_rad,
+              std::numbers::pi / 2, 1e-12);
 }
 
 //  odometry:  y ^    2      1: at (2, 1), looks along y    2: at (2, 3), looks along -x
 //               |
 //               |    1      The camera is 0.5 m ahead of the robot and looks to its left.
 //               +------> x
-TEST(Odometry, SaysHowTheMountedFloorMotiond) {
+TEST(Odometry, SaysHowTheMountedCameraMoved) {
   Odometry odometry(CameraMountedAt(0.5, 0, std::numbers::pi / 2));
   ASSERT_TRUE(odometry.Add(1, {{2, 1}, std::numbers::pi / 2}).ok());
   EXPECT_FALSE(odometry.MoveTo(1));  // the first image
