@@ -58,7 +58,7 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   }
   return arguments.odometry_path.empty()
              ? arguments.option_arguments.RefuseGiven(
-                   {"wheel_way_ratio", "wheel_turn_ratio", "odometry_sigma_m", "odometry_sigma_deg"},
+                   {"odometry_way_ratio", "odometry_turn_ratio", "odometry_sigma_m", "odometry_sigma_deg"},
                    "is the error of odometry; give --odometry, or leave it out")
              : arguments.option_arguments.RefuseGiven({"unknown_way_sigma_m", "unknown_turn_sigma_deg"},
                                                       "is for frames without odometry; leave it out");
