@@ -11,20 +11,10 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
 #include "runtime/map/block_cache.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
 namespace {
-
-const SyntheticRoom& Room() {
-  static const SyntheticRoom room = MakeSyntheticRoom(1);
-  return room;
-}
-
-std::shared_ptr<const Map> RoomMap() {
-  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
-  return map;
-}
 
 // The synthetic rooms' errors are independent of each other: no factor for those that are not.
 LocalizerOptions IndependentErrors() {

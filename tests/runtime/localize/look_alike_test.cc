@@ -9,15 +9,10 @@
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/track/region_tracker.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
 namespace {
-
-const SyntheticRoom& Room() {
-  static const SyntheticRoom room = MakeSyntheticRoom(1);
-  return room;
-}
 
 constexpr double kApartM = 30;
 

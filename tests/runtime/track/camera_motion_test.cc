@@ -12,7 +12,7 @@
 #include "core/geometry/planar_pose.h"
 #include "runtime/localize/refine.h"
 #include "runtime/track/region_tracker.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
 namespace {
@@ -174,27 +174,15 @@ TEST(CheckUncertainPose, WhatIsNoPoseOrNoCovarianceIsRefused) {
   EXPECT_THAT(error_of({Pose(), negative}), HasSubstr("negative"));
 }
 
-// A drive around the room's middle, 10 cm and 3 degrees a frame.
-class DarkRoomTest : public testing::Test {
- protected:
-  static Pose OnDrive(int i) {
-    const double angle_deg = 3.0 * i;
-    const double angle = RadFromDeg(angle_deg);
-    return PoseAt({2 * std::cos(angle), 2 * std::sin(angle), 1.2}, angle_deg + 90);
-  }
-  Localization Show(RegionTracker* tracker, int i) {
-    return *tracker->TrackFeatures(RenderFeatures(room_, OnDrive(i), {}, 500 + i), room_.camera);
-  }
-  void ShowNothing(RegionTracker* tracker) { ASSERT_TRUE(tracker->TrackFeatures({}, room_.camera).ok()); }
-  // From frame i to the next, over the floor.
-  static FloorMotion StepFrom(int i) { return OverFloor(OnDrive(i + 1) * OnDrive(i).Inverse()); }
+Localization Show(RegionTracker* tracker, int i) {
+  return *tracker->TrackFeatures(RenderFeatures(Room(), OnDrive(i), {}, 500 + i), Room().camera);
+}
+void ShowNothing(RegionTracker* tracker) { ASSERT_TRUE(tracker->TrackFeatures({}, Room().camera).ok()); }
+// From frame i to the next, over the floor.
+FloorMotion StepFrom(int i) { return OverFloor(OnDrive(i + 1) * OnDrive(i).Inverse()); }
 
-  SyntheticRoom room_ = MakeSyntheticRoom(1);
-  std::shared_ptr<const Map> map_ = *Map::FromRows(room_.rows);
-};
-
-TEST_F(DarkRoomTest, OdometryLeadsThroughTheDark) {
-  RegionTracker tracker(map_), blind(map_);
+TEST(DarkRoom, OdometryLeadsThroughTheDark) {
+  RegionTracker tracker(RoomMap()), blind(RoomMap());
   EXPECT_FALSE(tracker.Believed());
   ASSERT_TRUE(Show(&tracker, 0).has_fix());
   ASSERT_TRUE(Show(&blind, 0).has_fix());
@@ -219,8 +207,8 @@ TEST_F(DarkRoomTest, OdometryLeadsThroughTheDark) {
   EXPECT_NE(Show(&blind, kLight).scope, Scope::kTrack);
 }
 
-TEST_F(DarkRoomTest, AMotionInSpaceDoesAsWell) {
-  RegionTracker tracker(map_);
+TEST(DarkRoom, AMotionInSpaceDoesAsWell) {
+  RegionTracker tracker(RoomMap());
   ASSERT_TRUE(Show(&tracker, 0).has_fix());
   Matrix6d covariance = Matrix6d::Identity() * 1e-6;
   for (int i = 0; i < 30; ++i) {
@@ -233,8 +221,8 @@ TEST_F(DarkRoomTest, AMotionInSpaceDoesAsWell) {
   EXPECT_EQ(tracker.Move({Pose(), covariance}).error().code, ErrorCode::kInvalidArgument);
 }
 
-TEST_F(DarkRoomTest, FramesOfWhichNothingIsToldMakeItLessCertain) {
-  RegionTracker tracker(map_);
+TEST(DarkRoom, FramesOfWhichNothingIsToldMakeItLessCertain) {
+  RegionTracker tracker(RoomMap());
   ASSERT_TRUE(Show(&tracker, 0).has_fix());
   ASSERT_TRUE(tracker.Move({0.1, 0}, 0).ok());
   const double told_m = tracker.Prediction()->sigma_m;
@@ -244,8 +232,8 @@ TEST_F(DarkRoomTest, FramesOfWhichNothingIsToldMakeItLessCertain) {
   EXPECT_GE(tracker.Prediction()->sigma_m, RegionTrackerOptions().step_sigma_m);
 }
 
-TEST_F(DarkRoomTest, AKidnappedRobotIsFoundThoughItsWheelsStoodStill) {
-  RegionTracker tracker(map_);
+TEST(DarkRoom, AKidnappedRobotIsFoundThoughItsWheelsStoodStill) {
+  RegionTracker tracker(RoomMap());
   ASSERT_TRUE(Show(&tracker, 0).has_fix());
   ASSERT_TRUE(tracker.Move({0, 0}, 0).ok());
   const Localization found = Show(&tracker, 60);
@@ -254,13 +242,13 @@ TEST_F(DarkRoomTest, AKidnappedRobotIsFoundThoughItsWheelsStoodStill) {
   EXPECT_LT(CenterErrorM(found.cam_from_world, OnDrive(60)), 0.05);
 }
 
-TEST_F(DarkRoomTest, OdometryThatIsNoNumberOrHasNoUnitIsRefused) {
-  RegionTracker tracker(map_);
+TEST(DarkRoom, OdometryThatIsNoNumberOrHasNoUnitIsRefused) {
+  RegionTracker tracker(RoomMap());
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(tracker.Move({kNan, 0}, 0).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(tracker.Move({0, 0}, kNan).error().code, ErrorCode::kInvalidArgument);
   EXPECT_FALSE(tracker.Prediction());
-  MapRows unscaled = room_.rows;
+  MapRows unscaled = Room().rows;
   unscaled.frame.unit = "arbitrary";
   RegionTracker without_unit(*Map::FromRows(unscaled));
   EXPECT_EQ(without_unit.Move({1, 0}, 0).error().code, ErrorCode::kUnsupported);

@@ -5,27 +5,10 @@
 
 #include "runtime/localize/region_votes.h"
 #include "runtime/map/landmark_set.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
 namespace {
-
-const SyntheticRoom& Room() {
-  static const SyntheticRoom room = MakeSyntheticRoom(1);
-  return room;
-}
-
-std::shared_ptr<const Map> RoomMap() {
-  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
-  return map;
-}
-
-// Frame i of a drive around the room's middle: 10 cm and 3 degrees a frame.
-Pose OnDrive(int i) {
-  const double angle_deg = 3.0 * i;
-  const double angle = RadFromDeg(angle_deg);
-  return PoseAt({2 * std::cos(angle), 2 * std::sin(angle), 1.2}, angle_deg + 90);
-}
 
 Result<Localization> Show(RegionTracker& tracker, const Pose& pose, int frame) {
   return tracker.TrackFeatures(RenderFeatures(Room(), pose, {}, 500 + frame), Room().camera);
