@@ -13,6 +13,7 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/map.h"
+#include "runtime/track/camera_motion.h"
 
 namespace cairn {
 namespace {
@@ -146,14 +147,7 @@ Result<PlaceBelief> PlaceBelief::Make(std::shared_ptr<const Map> map, const Plac
 
 Status PlaceBelief::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
   return WithoutExceptions("place belief", [&]() -> Status {
-    if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
-      return MakeError(ErrorCode::kInvalidArgument, "odometry: a way or a turn that is no number");
-    const MapHead& head = map_->head();
-    if (!IsMetric(head.frame)) {
-      return MakeError(ErrorCode::kUnsupported,
-                       "odometry is in metres, and the unit of map '{}' is not known; leave the odometry out",
-                       head.name);
-    }
+    CAIRN_RETURN_IF_ERROR(CheckFloorMotion({way_m, turn_left_rad}, map_->head()));
     way_m_ += Eigen::Rotation2Dd(turn_left_rad_) * way_m;
     turn_left_rad_ += turn_left_rad;
     driven_views_ += graph_->ViewDistance(way_m, turn_left_rad);

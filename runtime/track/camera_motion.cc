@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/blocks/map_head.h"
 #include "core/geometry/floor_pose.h"
 #include "runtime/localize/refine.h"
 
@@ -46,6 +47,15 @@ Status CheckUncertainPose(const UncertainPose& given) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance, Eigen::EigenvaluesOnly);
   if (!(solver.eigenvalues().minCoeff() >= -most)) return refuse("the covariance has a negative variance");
   return Ok();
+}
+
+Status CheckFloorMotion(const FloorMotion& motion, const MapHead& map) {
+  if (!motion.way_m.allFinite() || !std::isfinite(motion.turn_left_rad))
+    return MakeError(ErrorCode::kInvalidArgument, "odometry: a way or a turn that is no number");
+  if (IsMetric(map.frame)) return Ok();
+  return MakeError(ErrorCode::kUnsupported,
+                   "odometry is in metres, and the unit of map '{}' is not known; leave the odometry out",
+                   map.name);
 }
 
 PlanarPose CameraOnFloor(const Pose& robot_from_camera) {

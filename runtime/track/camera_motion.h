@@ -10,6 +10,8 @@
 
 namespace cairn {
 
+struct MapHead;  // core/blocks/map_head.h
+
 // A pose b_from_a and how well it is known: a camera's cam_from_world, or how one moved from a frame to the
 // next, next_from_last, as an odometry in space (visual, inertial) says.
 struct UncertainPose {
@@ -26,6 +28,9 @@ struct FloorMotion {
   Eigen::Vector2d way_m = Eigen::Vector2d::Zero();
   double turn_left_rad = 0;
 };
+// Whether odometry can move a camera in a map.  Errors: InvalidArgument (not finite), Unsupported (a map
+// whose unit is not the metre).
+Status CheckFloorMotion(const FloorMotion& motion, const MapHead& map);
 // Where a mounted camera is on the floor, in its robot's frame, and to where it looks: to its image's top
 // where it looks up or down.  What moves the robot moves the camera there.  The identity says that nobody
 // stated where: above the middle of the axle, ahead.

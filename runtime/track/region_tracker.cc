@@ -74,14 +74,8 @@ Status RegionTracker::Move(const UncertainPose& next_from_last) {
 }
 
 Status RegionTracker::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
-  if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
-    return MakeError(ErrorCode::kInvalidArgument, "odometry: a way or a turn that is no number");
   const MapHead& head = map_->head();
-  if (!IsMetric(head.frame)) {
-    return MakeError(ErrorCode::kUnsupported,
-                     "odometry is in metres, and the unit of map '{}' is not known; leave the odometry out",
-                     head.name);
-  }
+  CAIRN_RETURN_IF_ERROR(CheckFloorMotion({way_m, turn_left_rad}, head));
   was_told_ = true;
   if (motion_) motion_->Add(FloorMotion{way_m, turn_left_rad}, head.floor_from_world, options_.wheels);
   return Ok();
