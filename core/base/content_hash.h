@@ -2,6 +2,7 @@
 
 #include <compare>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -16,6 +17,19 @@ struct ContentHash {
   friend auto operator<=>(const ContentHash&, const ContentHash&) = default;
 };
 ContentHash HashContents(std::string_view bytes);
+
+// HashContents of contents that come in parts.
+class PartsHasher {
+ public:
+  PartsHasher();
+  ~PartsHasher();
+  void Add(std::string_view part);
+  ContentHash Finish() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 // A hash as 16 bytes of a blob.
 void WriteHash(const ContentHash& hash, BlobWriter* blob);

@@ -23,6 +23,7 @@ Status ReplaceFileAtomically(const std::string& path,
 
 // XXH3, 128 bits as 32 hexadecimal digits: content hashes of files and options.  Not cryptographic.
 std::string HashBytes(std::string_view bytes);
+// Of a file of any size, in little memory.  Errors: as ReadFile.
 Result<std::string> HashFile(const std::string& path);
 
 }  // namespace cairn

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <utility>
+
 namespace cairn {
 
 // An open file's descriptor, or the -1 that open() returned; closed by the destructor.
@@ -11,8 +13,8 @@ class FileDescriptor {
   ~FileDescriptor() {
     if (descriptor_ >= 0) close(descriptor_);
   }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  FileDescriptor(FileDescriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  FileDescriptor& operator=(FileDescriptor&&) = delete;
 
   int get() const { return descriptor_; }
 

@@ -375,7 +375,7 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
       if (cut_short.exit_code != 0) {
         EXPECT_EQ(cut_short.exit_code, 1) << limit_mib << ": " << cut_short.err;
         EXPECT_THAT(cut_short.err, HasSubstr("--memory")) << limit_mib;
-        EXPECT_FALSE(fs::exists(folder / "out"));
+        EXPECT_FALSE(fs::exists(folder / "out")) << limit_mib << ": " << cut_short.err;
       }
       fs::remove(folder / "out");
     }
