@@ -146,6 +146,20 @@ std::vector<Task> Tasks() {
   tasks.push_back({"cairn, without the first octave",
                    [=](const cv::Mat& i) { FindOurs(i, BestSiftKernels(), coarse); },
                    {}});
+  tasks.push_back({"cairn, not doubled",
+                   [=](const cv::Mat& i) { FindOurs(i, BestSiftKernels(), {.doubled = false}); },
+                   {}});
+  tasks.push_back(
+      {"cairn, not doubled, without the first octave",
+       [=](const cv::Mat& i) { FindOurs(i, BestSiftKernels(), {.doubled = false, .first_octave = 1}); },
+       {}});
+  tasks.push_back({"cairn, not doubled, the first octave in a fifth of the image",
+                   [=](const cv::Mat& i) {
+                     const auto is_wanted = [](float x, float, float) { return std::fmod(x, 50.0f) < 10; };
+                     FindOurs(i, BestSiftKernels(),
+                              {.doubled = false, .end_octave = 1, .is_wanted = is_wanted});
+                   },
+                   {}});
   for (const int side : {64, 160}) {
     region.region = cv::Rect(240, 160, side, side);
     region.end_octave = 3;

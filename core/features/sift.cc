@@ -15,23 +15,71 @@ namespace {
 constexpr int kMinImageSide = 6;
 static_assert(kSiftDim == kDescriptorDim);
 
-// Features of the image made smaller by `ratio`, in the pixels of the whole one.  With pixels counted from
-// the image's corner, a position in one is a multiple of that in the other.
-Result<Features> ExtractFromSmaller(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask,
-                                    double ratio) {
+// Least scale of octave 1: half a layer above its level 0.
+constexpr double kOctaveOneScalePx = 1.7959392773;  // 1.6 * 2^(1/6)
+
+// Of an image that is made smaller before; at most 1.
+double SmallerRatio(cv::Size image, const SiftOptions& options) {
+  return std::min(1.0, static_cast<double>(options.max_image_side_px) / std::max(image.width, image.height));
+}
+
+using IsWanted = std::function<bool(const Keypoint&)>;
+
+// `search`: which octaves, of the doubled image or not.
+Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask, SiftSearch search,
+                 const IsWanted& is_wanted) {
+  Features features;
+  features.descriptors.resize(0, kDescriptorDim);
+  if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
+  search.max_num_features = options.max_num_features;
+  search.contrast_threshold = options.contrast_threshold;
+  search.edge_threshold = options.edge_threshold;
+  if (is_wanted) {
+    search.is_wanted = [&is_wanted](float x, float y, float size) {
+      return is_wanted(KeypointFromOpenCv(x, y, size, 0));
+    };
+  }
+  const std::vector<SiftFeature> found = FindSift(grey, mask, search);
+  features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kDescriptorDim);
+  features.keypoints.reserve(found.size());
+  for (const SiftFeature& feature : found) {
+    std::copy(feature.root_sift.begin(), feature.root_sift.end(),
+              features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
+    features.keypoints.push_back(KeypointFromOpenCv(feature.x, feature.y, feature.size, feature.angle_deg));
+  }
+  return features;
+}
+
+// The same of an image that is made smaller by SmallerRatio, in the pixels of the whole one.  With pixels
+// counted from the image's corner, a position in one is a multiple of that in the other.
+Features ExtractFromSmaller(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask,
+                            const SiftSearch& search, const IsWanted& is_wanted) {
+  const double ratio = SmallerRatio(grey.size(), options);
+  if (ratio == 1) return Extract(grey, options, mask, search, is_wanted);
   const cv::Size size(std::max(1, cvRound(ratio * grey.cols)), std::max(1, cvRound(ratio * grey.rows)));
   cv::Mat small, small_mask;
   cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
   if (!mask.empty()) cv::resize(mask, small_mask, size, 0, 0, cv::INTER_NEAREST);
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(small, options, small_mask));
   const float x_scale = static_cast<float>(grey.cols) / static_cast<float>(size.width);
   const float y_scale = static_cast<float>(grey.rows) / static_cast<float>(size.height);
-  for (Keypoint& keypoint : features.keypoints) {
+  const auto larger = [&](Keypoint keypoint) {
     keypoint.x *= x_scale;
     keypoint.y *= y_scale;
     keypoint.scale *= std::sqrt(x_scale * y_scale);
-  }
+    return keypoint;
+  };
+  IsWanted is_small_wanted;
+  if (is_wanted) is_small_wanted = [&](const Keypoint& keypoint) { return is_wanted(larger(keypoint)); };
+  Features features = Extract(small, options, small_mask, search, is_small_wanted);
+  for (Keypoint& keypoint : features.keypoints) keypoint = larger(keypoint);
   return features;
+}
+
+Status CheckGrey(const cv::Mat& grey) {
+  if (!grey.empty() && grey.type() == CV_8UC1) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "SIFT needs an 8-bit grey image, found {} x {} of OpenCV type {}", grey.cols, grey.rows,
+                   grey.type());
 }
 
 }  // namespace
@@ -70,35 +118,24 @@ Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg) {
 }
 
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask) {
-  if (grey.empty() || grey.type() != CV_8UC1) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "SIFT needs an 8-bit grey image, found {} x {} of OpenCV type {}", grey.cols, grey.rows,
-                     grey.type());
-  }
+  CAIRN_RETURN_IF_ERROR(CheckGrey(grey));
   if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
     return MakeError(ErrorCode::kInvalidArgument, "a mask of {} x {} px does not fit the image of {} x {} px",
                      mask.cols, mask.rows, grey.cols, grey.rows);
   }
-  Features features;
-  features.descriptors.resize(0, kDescriptorDim);
-  if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
-  const int longer_side = std::max(grey.cols, grey.rows);
-  if (longer_side > options.max_image_side_px) {
-    return ExtractFromSmaller(grey, options, mask,
-                              static_cast<double>(options.max_image_side_px) / longer_side);
-  }
-  const std::vector<SiftFeature> found = FindSift(grey, mask,
-                                                  {.max_num_features = options.max_num_features,
-                                                   .contrast_threshold = options.contrast_threshold,
-                                                   .edge_threshold = options.edge_threshold});
-  features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kDescriptorDim);
-  features.keypoints.reserve(found.size());
-  for (const SiftFeature& feature : found) {
-    std::copy(feature.root_sift.begin(), feature.root_sift.end(),
-              features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
-    features.keypoints.push_back(KeypointFromOpenCv(feature.x, feature.y, feature.size, feature.angle_deg));
-  }
-  return features;
+  return ExtractFromSmaller(grey, options, mask, {}, {});
+}
+
+double CoarseSiftScalePx(cv::Size image, const SiftOptions& options) {
+  return kOctaveOneScalePx / SmallerRatio(image, options);
+}
+
+Result<Features> ExtractUndoubledSift(const cv::Mat& grey, const SiftOptions& options, SiftScales scales,
+                                      const std::function<bool(const Keypoint&)>& is_wanted) {
+  CAIRN_RETURN_IF_ERROR(CheckGrey(grey));
+  SiftSearch search{.doubled = false};
+  (scales == SiftScales::kCoarse ? search.first_octave : search.end_octave) = 1;
+  return ExtractFromSmaller(grey, options, {}, search, is_wanted);
 }
 
 }  // namespace cairn

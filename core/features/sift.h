@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include <opencv2/core/mat.hpp>
 
 #include "core/base/error.h"
@@ -27,6 +29,18 @@ OptionTable DescribeOptions(SiftOptions* options);
 // `mask`, if not empty, has the image's size; features at zero pixels are dropped.  A blank or tiny image
 // gives no features, not an error.  Errors: InvalidArgument for an image or mask of another type or size.
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask = {});
+
+// Scales of features, in octaves of their own: above and below CoarseSiftScalePx.
+enum class SiftScales { kCoarse, kFine };
+// Least scale of an image's coarse features, sigma, px of the image.
+double CoarseSiftScalePx(cv::Size image, const SiftOptions& options);
+
+// Features of these scales from the image's own pixels, not from the doubled image's (SiftSearch::doubled):
+// as many of them show a map's landmarks as of ExtractSift's.  The coarse ones take a quarter of its time,
+// the fine ones about as much, and those of them that are not wanted a tenth.  Order and errors: as
+// ExtractSift.
+Result<Features> ExtractUndoubledSift(const cv::Mat& grey, const SiftOptions& options, SiftScales scales,
+                                      const std::function<bool(const Keypoint&)>& is_wanted = {});
 
 // OpenCV's keypoint position in COLMAP's pixels: half a pixel for the pixel's centre, minus the quarter that
 // OpenCV 4.6's SIFT adds when it starts from the doubled image.

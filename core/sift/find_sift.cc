@@ -14,21 +14,18 @@ namespace {
 constexpr int kOctaveBorder = 5;  // pixels without keypoints, as OpenCV
 constexpr size_t kMaxFloatsKept = size_t{64} << 18;
 
-// The image's pixel is 2^(1 - octave) of the octave's.
-float ImageScale(int octave) { return std::ldexp(0.5f, octave); }
-
 cv::Rect Grown(const cv::Rect& rect, int by, cv::Size within) {
   return cv::Rect(rect.x - by, rect.y - by, rect.width + 2 * by, rect.height + 2 * by) &
          cv::Rect({0, 0}, within);
 }
 
 // The part of an octave where keypoints of a region of the image begin.
-cv::Rect SoughtIn(int octave, cv::Size size, const cv::Rect& region) {
-  const cv::Rect inside(kOctaveBorder, kOctaveBorder, size.width - 2 * kOctaveBorder,
-                        size.height - 2 * kOctaveBorder);
+cv::Rect SoughtIn(const OctavePlan& plan, const cv::Rect& region) {
+  const cv::Rect inside(kOctaveBorder, kOctaveBorder, plan.size.width - 2 * kOctaveBorder,
+                        plan.size.height - 2 * kOctaveBorder);
   if (inside.width <= 0 || inside.height <= 0) return {};
   if (region.empty()) return inside;
-  const double scale = 1 / ImageScale(octave);
+  const double scale = 1 / plan.pixel;
   // A pixel for the quarter and the half that positions are off, one for rounding, and the drift.
   constexpr int kSlack = kSiftMaxDrift + 3;
   const auto from = [&](int at) { return static_cast<int>(std::floor(at * scale)) - kSlack; };
@@ -38,34 +35,57 @@ cv::Rect SoughtIn(int octave, cv::Size size, const cv::Rect& region) {
          inside;
 }
 
-// Octaves from the first to the last that is searched, with what the later ones need of the earlier.
-std::vector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, const SiftSearch& search) {
+// The octaves that are searched, and those that they begin with: octave 0, or where the image is not doubled
+// octave 1, which are made of the image.
+std::vector<OctavePlan> OctavesOf(cv::Size image, const SiftSearch& search) {
   std::vector<OctavePlan> plans;
-  cv::Size size = image * 2;
-  for (int o = 0; o < std::min(NumOctaves(image), search.end_octave); ++o, size = size / 2) {
-    if (std::min(size.width, size.height) <= 2 * kOctaveBorder) break;
-    const cv::Rect sought = o < search.first_octave ? cv::Rect() : SoughtIn(o, size, region);
-    plans.push_back({.octave = o, .size = size, .sought = sought});
+  OctavePlan next{.size = image * 2};
+  if (!search.doubled) {
+    next = {.source = OctaveSource::kImage, .pixel = 1, .sigma = kSiftSigma / 2, .size = image};
   }
+  const int end = std::min(NumOctaves(image), search.end_octave);
+  for (; next.octave < end && std::min(next.size.width, next.size.height) > 2 * kOctaveBorder;
+       ++next.octave) {
+    if (search.doubled || next.octave > 0 || search.first_octave <= 0) plans.push_back(next);
+    if (next.sigma < kSiftSigma) {
+      next.sigma = kSiftSigma;  // the same pixels
+      continue;
+    }
+    next.source = OctaveSource::kOctaveBefore;
+    next.pixel *= 2;
+    next.size = next.size / 2;
+  }
+  return plans;
+}
+
+// The same with the windows that are computed, and without those at the end where nothing is sought.
+std::vector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, const SiftSearch& search) {
+  std::vector<OctavePlan> plans = OctavesOf(image, search);
+  for (OctavePlan& plan : plans) {
+    if (plan.octave >= search.first_octave) plan.sought = SoughtIn(plan, region);
+  }
+  while (!plans.empty() && plans.back().sought.empty()) plans.pop_back();
   cv::Rect needed;  // of this octave by the next one
   for (auto plan = plans.rbegin(); plan != plans.rend(); ++plan) {
     const cv::Rect own =
         plan->sought.empty() ? cv::Rect() : Grown(plan->sought, kSiftSearchReach, plan->size);
-    plan->window = own | needed;
-    if (plan->octave == 0) {
-      // From a pixel of the image to a pixel of the image, and the reach of the first Gaussian.
-      plan->window = Grown(plan->window, 6, plan->size);
-      const int right = (plan->window.br().x + 1) & ~1, bottom = (plan->window.br().y + 1) & ~1;
-      plan->window.x &= ~1;
-      plan->window.y &= ~1;
-      plan->window.width = right - plan->window.x;
-      plan->window.height = bottom - plan->window.y;
-    } else if (!plan->window.empty()) {
-      const cv::Rect& w = plan->window;
-      needed = Grown({2 * w.x, 2 * w.y, 2 * w.width, 2 * w.height}, kSiftLevelReach + 1, (plan + 1)->size);
+    cv::Rect& w = plan->window;
+    w = own | needed;
+    needed = {};
+    if (plan->source == OctaveSource::kOctaveBefore) {
+      if (!w.empty())
+        needed = Grown({2 * w.x, 2 * w.y, 2 * w.width, 2 * w.height}, kSiftLevelReach + 1, (plan + 1)->size);
+      continue;
+    }
+    w = Grown(w, kSiftImageReach, plan->size);
+    if (plan->source == OctaveSource::kDoubledImage) {  // from a pixel of the image to a pixel of the image
+      const int right = (w.br().x + 1) & ~1, bottom = (w.br().y + 1) & ~1;
+      w.x &= ~1;
+      w.y &= ~1;
+      w.width = right - w.x;
+      w.height = bottom - w.y;
     }
   }
-  while (!plans.empty() && plans.back().sought.empty()) plans.pop_back();
   return plans;
 }
 
@@ -73,19 +93,46 @@ bool SamePlace(const SiftExtremum& a, const SiftExtremum& b) {
   return a.octave == b.octave && a.layer == b.layer && a.x == b.x && a.y == b.y;
 }
 
-// Extrema in the region and the mask, each once, ordered by place.
-void SelectExtrema(const cv::Mat& mask, const cv::Rect& region, std::vector<SiftExtremum>* extrema) {
-  std::erase_if(*extrema, [&](const SiftExtremum& e) {
-    const float x = e.octave_x * ImageScale(e.octave), y = e.octave_y * ImageScale(e.octave);
-    if (!region.empty() && !(x >= static_cast<float>(region.x) && x < static_cast<float>(region.br().x) &&
-                             y >= static_cast<float>(region.y) && y < static_cast<float>(region.br().y)))
-      return true;
-    return !mask.empty() && mask.at<uint8_t>(static_cast<int>(y + 0.5f), static_cast<int>(x + 0.5f)) == 0;
-  });
-  std::sort(extrema->begin(), extrema->end(), [](const SiftExtremum& a, const SiftExtremum& b) {
+// A keypoint in the image, as OpenCV states it (SiftFeature), at first without its orientation.
+struct Located {
+  SiftExtremum extremum;
+  const Octave* octave = nullptr;
+  float x = 0;
+  float y = 0;
+  float size = 0;
+  float angle_deg = 0;
+};
+
+// Extrema that are wanted, each once, ordered by octave and place.
+std::vector<Located> SelectExtrema(const std::vector<Octave>& octaves, const cv::Mat& mask,
+                                   const SiftSearch& search, const cv::Rect& region,
+                                   std::vector<SiftExtremum> extrema) {
+  std::sort(extrema.begin(), extrema.end(), [](const SiftExtremum& a, const SiftExtremum& b) {
     return std::tie(a.octave, a.layer, a.y, a.x) < std::tie(b.octave, b.layer, b.y, b.x);
   });
-  extrema->erase(std::unique(extrema->begin(), extrema->end(), SamePlace), extrema->end());
+  extrema.erase(std::unique(extrema.begin(), extrema.end(), SamePlace), extrema.end());
+  // The doubled image's pixels are where OpenCV states them; those of the image a quarter pixel before.
+  const float offset = search.doubled ? 0 : 0.25f;
+  std::vector<Located> located;
+  located.reserve(extrema.size());
+  auto octave = octaves.begin();
+  for (const SiftExtremum& e : extrema) {
+    while (octave->plan().octave < e.octave) ++octave;
+    const float pixel = octave->plan().pixel;
+    const Located l{.extremum = e,
+                    .octave = &*octave,
+                    .x = e.octave_x * pixel + offset,
+                    .y = e.octave_y * pixel + offset,
+                    .size = 2 * e.octave_sigma * pixel};
+    if (!region.empty() && !(l.x >= static_cast<float>(region.x) && l.x < static_cast<float>(region.br().x) &&
+                             l.y >= static_cast<float>(region.y) && l.y < static_cast<float>(region.br().y)))
+      continue;
+    if (!mask.empty() && mask.at<uint8_t>(static_cast<int>(l.y + 0.5f), static_cast<int>(l.x + 0.5f)) == 0)
+      continue;
+    if (search.is_wanted && !search.is_wanted(l.x, l.y, l.size)) continue;
+    located.push_back(l);
+  }
+  return located;
 }
 
 SiftPatch PatchOf(const Octave& octave, int layer, int x, int y) {
@@ -97,16 +144,7 @@ SiftPatch PatchOf(const Octave& octave, int layer, int x, int y) {
           .y = y - octave.window().y};
 }
 
-// A keypoint in the image, as OpenCV states it (SiftFeature).
-struct Oriented {
-  SiftExtremum extremum;
-  float x = 0;
-  float y = 0;
-  float size = 0;
-  float angle_deg = 0;
-};
-
-auto PlaceOf(const Oriented& o) { return std::tie(o.y, o.x, o.size, o.angle_deg); }
+auto PlaceOf(const Located& l) { return std::tie(l.y, l.x, l.size, l.angle_deg); }
 
 using PatchWeights = std::array<float, kSiftMaxPatchRadius + 1>;
 
@@ -135,11 +173,9 @@ std::array<float, kSiftDirections + 2> SmoothHistogram(const Octave& octave, con
 }
 
 // A keypoint for each of the histogram's peaks [Lowe04 §5].
-void AddOriented(const Octave& octave, const SiftExtremum& extremum, const SiftKernels& kernels,
-                 std::vector<Oriented>* oriented) {
-  const auto smooth = SmoothHistogram(octave, extremum, kernels);
+void AddOriented(const Located& located, const SiftKernels& kernels, std::vector<Located>* oriented) {
+  const auto smooth = SmoothHistogram(*located.octave, located.extremum, kernels);
   const float least = 0.8f * *std::max_element(smooth.begin(), smooth.end());
-  const float scale = ImageScale(extremum.octave);
   for (int b = 0; b < kSiftDirections; ++b) {
     const float before = smooth[b], here = smooth[b + 1], after = smooth[b + 2];
     if (!(here > before && here > after && here >= least)) continue;
@@ -147,34 +183,32 @@ void AddOriented(const Octave& octave, const SiftExtremum& extremum, const SiftK
     float place = static_cast<float>(b) + 0.5f * (before - after) / (before - 2 * here + after);
     if (place < 0) place += kSiftDirections;
     const float angle = 360.0f - 360.0f / kSiftDirections * place;
-    oriented->push_back({.extremum = extremum,
-                         .x = extremum.octave_x * scale,
-                         .y = extremum.octave_y * scale,
-                         .size = 2 * extremum.octave_sigma * scale,
-                         .angle_deg = angle >= 360.0f ? 0.0f : angle});
+    oriented->push_back(located);
+    oriented->back().angle_deg = angle >= 360.0f ? 0.0f : angle;
   }
 }
 
 // The strongest features, those as strong as the weakest one in the order of their places.  Orientations
 // are found only as far down as they are needed.
-std::vector<Oriented> OrientStrongest(const std::vector<Octave>& octaves, std::vector<SiftExtremum> extrema,
-                                      size_t max_num, const SiftKernels& kernels) {
-  if (extrema.size() > max_num) {
-    std::stable_sort(extrema.begin(), extrema.end(),
-                     [](const SiftExtremum& a, const SiftExtremum& b) { return a.response > b.response; });
+std::vector<Located> OrientStrongest(std::vector<Located> located, size_t max_num,
+                                     const SiftKernels& kernels) {
+  if (located.size() > max_num) {
+    std::stable_sort(located.begin(), located.end(), [](const Located& a, const Located& b) {
+      return a.extremum.response > b.extremum.response;
+    });
   }
-  std::vector<Oriented> oriented;
-  oriented.reserve(std::min(extrema.size(), max_num) + extrema.size() / 4);
+  std::vector<Located> oriented;
+  oriented.reserve(std::min(located.size(), max_num) + located.size() / 4);
   size_t num_done = 0;
-  while (num_done < extrema.size() && oriented.size() < max_num) {
-    size_t end = std::min(extrema.size(), num_done + max_num - oriented.size());
-    while (end < extrema.size() && extrema[end].response == extrema[end - 1].response) ++end;
-    for (; num_done < end; ++num_done)
-      AddOriented(octaves[extrema[num_done].octave], extrema[num_done], kernels, &oriented);
+  while (num_done < located.size() && oriented.size() < max_num) {
+    size_t end = std::min(located.size(), num_done + max_num - oriented.size());
+    while (end < located.size() && located[end].extremum.response == located[end - 1].extremum.response)
+      ++end;
+    for (; num_done < end; ++num_done) AddOriented(located[num_done], kernels, &oriented);
   }
   if (oriented.size() > max_num) {
     std::nth_element(oriented.begin(), oriented.begin() + static_cast<int64_t>(max_num), oriented.end(),
-                     [](const Oriented& a, const Oriented& b) {
+                     [](const Located& a, const Located& b) {
                        return a.extremum.response != b.extremum.response
                                   ? a.extremum.response > b.extremum.response
                                   : PlaceOf(a) < PlaceOf(b);
@@ -182,15 +216,15 @@ std::vector<Oriented> OrientStrongest(const std::vector<Octave>& octaves, std::v
     oriented.resize(max_num);
   }
   std::sort(oriented.begin(), oriented.end(),
-            [](const Oriented& a, const Oriented& b) { return PlaceOf(a) < PlaceOf(b); });
+            [](const Located& a, const Located& b) { return PlaceOf(a) < PlaceOf(b); });
   return oriented;
 }
 
-void Describe(const Octave& octave, const Oriented& oriented, const SiftKernels& kernels,
-              uint8_t* root_sift) {
+void Describe(const Located& oriented, const SiftKernels& kernels, uint8_t* root_sift) {
   const SiftExtremum& extremum = oriented.extremum;
-  SiftPatch patch = PatchOf(octave, extremum.layer, static_cast<int>(std::nearbyint(extremum.octave_x)),
-                            static_cast<int>(std::nearbyint(extremum.octave_y)));
+  SiftPatch patch =
+      PatchOf(*oriented.octave, extremum.layer, static_cast<int>(std::nearbyint(extremum.octave_x)),
+              static_cast<int>(std::nearbyint(extremum.octave_y)));
   const float cell = 3 * extremum.octave_sigma;
   patch.radius = static_cast<int>(std::nearbyint(cell * 1.41421356f * (kSiftCells + 1) * 0.5f));
   // A Gaussian of half the descriptor's width [Lowe04 §6.1].
@@ -207,20 +241,20 @@ void Describe(const Octave& octave, const Oriented& oriented, const SiftKernels&
 }
 
 // Descriptors of keypoints, octave by octave, as neighbours share what is in the caches.
-std::vector<SiftFeature> DescribeAll(const std::vector<Octave>& octaves,
-                                     const std::vector<Oriented>& oriented, const SiftKernels& kernels) {
+std::vector<SiftFeature> DescribeAll(const std::vector<Octave>& octaves, const std::vector<Located>& oriented,
+                                     const SiftKernels& kernels) {
   std::vector<SiftFeature> features(oriented.size());
   for (const Octave& octave : octaves) {
     for (size_t i = 0; i < oriented.size(); ++i) {
-      const Oriented& o = oriented[i];
-      if (o.extremum.octave != octave.plan().octave) continue;
+      const Located& o = oriented[i];
+      if (o.octave != &octave) continue;
       features[i] = {.x = o.x,
                      .y = o.y,
                      .size = o.size,
                      .angle_deg = o.angle_deg,
                      .response = o.extremum.response,
                      .octave = o.extremum.octave};
-      Describe(octave, o, kernels, features[i].root_sift.data());
+      Describe(o, kernels, features[i].root_sift.data());
     }
   }
   return features;
@@ -244,15 +278,15 @@ std::vector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, cons
   for (const OctavePlan& plan : plans) {
     Octave& octave = octaves.emplace_back(plan, next, kernels);
     next += Octave::NumFloats(plan);
-    if (plan.octave == 0) {
-      octave.Sweep(grey, thresholds, &extrema);
+    if (plan.source == OctaveSource::kOctaveBefore) {
+      octave.Sweep(octaves[octaves.size() - 2], thresholds, &extrema);
     } else {
-      octave.Sweep(octaves[plan.octave - 1], thresholds, &extrema);
+      octave.Sweep(grey, thresholds, &extrema);
     }
   }
-  SelectExtrema(mask, region, &extrema);
-  const std::vector<Oriented> oriented =
-      OrientStrongest(octaves, std::move(extrema), static_cast<size_t>(search.max_num_features), kernels);
+  const std::vector<Located> oriented =
+      OrientStrongest(SelectExtrema(octaves, mask, search, region, std::move(extrema)),
+                      static_cast<size_t>(search.max_num_features), kernels);
   std::vector<SiftFeature> features = DescribeAll(octaves, oriented, kernels);
   memory.Trim(kMaxFloatsKept);
   return features;

@@ -10,35 +10,58 @@
 namespace cairn {
 namespace {
 
-constexpr double kSquaredSigma = 1.6 * 1.6;  // of level 0 [Lowe04 §3.3]
 // The image's own blur, sigma 0.5 px, which is 1 px of the doubled image [Lowe04 §3.3].
 constexpr double kSquaredDoubledSigma = 1.0;
+// Doubling adds its own, that of linear interpolation a quarter pixel off: less is taken for the image's own
+// where it is not doubled, so that levels are as blurred as those of the doubled image.
+constexpr double kSquaredImageSigma = 0.25 - 0.25 * 0.75;
 constexpr double kSquaredLevelRatio = 1.5874010519681994748;  // 2^(2 / kSiftLayers)
 
-// Radii of the Gaussians that lead to each level, the first from the doubled image: 4 sigma, rounded as
-// OpenCV rounds the whole width.
+// Radii of the Gaussians that lead to each level: 4 sigma, rounded as OpenCV rounds the whole width.  To
+// level 0 from the doubled image, to level 0 from the image, and with sigmas that are half as large.
 constexpr std::array<int, kSiftLevels> kRadii = {5, 5, 6, 8, 10, 13};
+constexpr int kRadiusFromImage = 7;
+constexpr std::array<int, kSiftLevels> kHalvedRadii = {3, 3, 3, 4, 5, 6};
+static_assert(kRadiusFromImage + 1 == kSiftImageReach);
 static_assert(kRadii[1] + kRadii[2] + kRadii[3] == kSiftLevelReach);
 static_assert(kSiftLevelReach + kRadii[4] + kRadii[5] == kSiftTopReach);
 
 // Rows kept of each level, powers of two: those that the next level and a refinement still need.  0: all.
 constexpr std::array<int, kSiftLevels> kRowsKept = {64, 0, 0, 0, 64, 32};
-constexpr int kDoubledRowsKept = 32;
+constexpr int kImageRowsKept = 32;
 constexpr int kRowMargin = 64;  // floats before the first row and behind the last that kernels may read
 
-using Taps = std::array<std::array<float, kSiftMaxBlurRadius + 1>, kSiftLevels>;
-const Taps& AllTaps() {
-  static const Taps taps = [] {
-    Taps all;
-    all[0] = GaussianTaps(kSquaredSigma - kSquaredDoubledSigma, kRadii[0]);
-    double squared_sigma = kSquaredSigma;  // of the level before
-    for (int l = 1; l < kSiftLevels; ++l) {
-      all[l] = GaussianTaps(squared_sigma * kSquaredLevelRatio - squared_sigma, kRadii[l]);
-      squared_sigma *= kSquaredLevelRatio;
-    }
-    return all;
+}  // namespace
+
+struct OctaveBlurs {
+  std::array<int, kSiftLevels> radii{};  // of the Gaussian that leads to each level
+  std::array<std::array<float, kSiftMaxBlurRadius + 1>, kSiftLevels> taps{};
+};
+
+namespace {
+
+OctaveBlurs MakeBlurs(double squared_source_sigma, double sigma, std::array<int, kSiftLevels> radii) {
+  OctaveBlurs blurs{.radii = radii};
+  double squared_sigma = sigma * sigma;  // of the level before
+  blurs.taps[0] = GaussianTaps(squared_sigma - squared_source_sigma, radii[0]);
+  for (int l = 1; l < kSiftLevels; ++l) {
+    blurs.taps[l] = GaussianTaps(squared_sigma * kSquaredLevelRatio - squared_sigma, radii[l]);
+    squared_sigma *= kSquaredLevelRatio;
+  }
+  return blurs;
+}
+
+const OctaveBlurs& BlursOf(const OctavePlan& plan) {
+  static const OctaveBlurs from_doubled = MakeBlurs(kSquaredDoubledSigma, kSiftSigma, kRadii);
+  if (plan.source != OctaveSource::kImage) return from_doubled;  // level 0 of another octave is not blurred
+  static const OctaveBlurs from_image = [] {
+    std::array<int, kSiftLevels> radii = kRadii;
+    radii[0] = kRadiusFromImage;
+    return MakeBlurs(kSquaredImageSigma, kSiftSigma, radii);
   }();
-  return taps;
+  if (plan.sigma == kSiftSigma) return from_image;
+  static const OctaveBlurs halved = MakeBlurs(kSquaredImageSigma, kSiftSigma / 2, kHalvedRadii);
+  return halved;
 }
 
 // Whole blocks, and a few floats so that rows do not fall on the same places of a cache.
@@ -67,7 +90,7 @@ float SearchThreshold(double contrast) {
 }  // namespace
 
 size_t Octave::NumFloats(const OctavePlan& plan) {
-  int64_t rows = plan.octave == 0 ? kDoubledRowsKept : 0;
+  int64_t rows = plan.source == OctaveSource::kOctaveBefore ? 0 : kImageRowsKept;
   for (int l = 0; l < kSiftLevels; ++l) rows += NumRowsKept(plan, l);
   const int64_t stride = StrideOf(plan.window.width);
   // A multiple of a cache line, as are its terms.
@@ -76,15 +99,15 @@ size_t Octave::NumFloats(const OctavePlan& plan) {
 }
 
 Octave::Octave(const OctavePlan& plan, float* memory, const SiftKernels& kernels)
-    : plan_(plan), kernels_(kernels), stride_(StrideOf(plan.window.width)) {
+    : plan_(plan), kernels_(kernels), stride_(StrideOf(plan.window.width)), blurs_(BlursOf(plan)) {
   float* next = memory + kRowMargin;
   for (int l = 0; l < kSiftLevels; ++l) {
     levels_[l] = {next, kRowsKept[l] == 0 ? -1 : kRowsKept[l] - 1};
     next += NumRowsKept(plan, l) * stride_;
   }
-  if (plan.octave == 0) {
-    doubled_ = next;
-    next += kDoubledRowsKept * stride_;
+  if (plan.source != OctaveSource::kOctaveBefore) {
+    image_rows_ = next;
+    next += kImageRowsKept * stride_;
   }
   padded_ = next + kRowMargin;
   next = padded_ + kSiftBatchRows * SiftPaddedStride(plan.window.width);
@@ -94,16 +117,16 @@ Octave::Octave(const OctavePlan& plan, float* memory, const SiftKernels& kernels
 void Octave::BlurRows(int level, int y, int num) {
   const float* rows[2 * kSiftMaxBlurRadius + kSiftBatchRows];
   float* blurred[kSiftBatchRows];
-  const int radius = kRadii[level];
+  const int radius = blurs_.radii[level];
   for (int i = 0; i < num + 2 * radius; ++i) {
     const int from = MirroredRow(y + i - radius, plan_.window.height);
-    rows[i] = level == 0 ? doubled_ + (from % kDoubledRowsKept) * stride_ : Row(level - 1, from);
+    rows[i] = level == 0 ? image_rows_ + (from % kImageRowsKept) * stride_ : Row(level - 1, from);
   }
   for (int i = 0; i < num; ++i) blurred[i] = MutableRow(level, y + i);
   kernels_.blur_rows({.rows = rows,
                       .blurred = blurred,
                       .num_rows = num,
-                      .taps = AllTaps()[level].data(),
+                      .taps = blurs_.taps[level].data(),
                       .radius = radius,
                       .cols = plan_.window.width,
                       .padded = padded_});
@@ -111,21 +134,26 @@ void Octave::BlurRows(int level, int y, int num) {
 
 void Octave::Sweep(const cv::Mat& grey, const SiftThresholds& thresholds,
                    std::vector<SiftExtremum>* extrema) {
-  // The window's corner is at a pixel of the image.
   const cv::Rect& window = plan_.window;
-  int num_doubled = 0;
-  const auto double_row = [&](int y) {
+  const auto pixels = [&](int row, int x) {
+    return grey.ptr<uint8_t>(std::clamp(row, 0, grey.rows - 1)) + x;
+  };
+  int num_read = 0;
+  const auto read_row = [&](int y) {
+    float* const to = image_rows_ + (y % kImageRowsKept) * stride_;
+    if (plan_.source == OctaveSource::kImage) {
+      const uint8_t* const from = pixels(window.y + y, window.x);
+      for (int x = 0; x < window.width; ++x) to[x] = from[x];
+      return;
+    }
+    // The window's corner is at a pixel of the image.
     const int row = (y + window.y) / 2, other = (y + window.y) % 2 == 0 ? row - 1 : row + 1;
-    const auto pixels = [&](int r) {
-      return grey.ptr<uint8_t>(std::clamp(r, 0, grey.rows - 1)) + window.x / 2;
-    };
-    kernels_.double_row(pixels(row), pixels(other), window.width / 2,
-                        doubled_ + (y % kDoubledRowsKept) * stride_);
+    kernels_.double_row(pixels(row, window.x / 2), pixels(other, window.x / 2), window.width / 2, to);
   };
   SweepRows(
       [&](int y, int num) {
-        const int end = std::min(window.height, y + num + kRadii[0]);
-        while (num_doubled < end) double_row(num_doubled++);
+        const int end = std::min(window.height, y + num + blurs_.radii[0]);
+        while (num_read < end) read_row(num_read++);
         BlurRows(0, y, num);
       },
       thresholds, extrema);
@@ -174,7 +202,7 @@ void Octave::SweepRows(const FirstLevelRows& first_level_rows, const SiftThresho
     // Rows that those of the top level need.
     std::array<int, kSiftLevels> end{};
     end[top] = std::min(num_rows, y + kSiftBatchRows);
-    for (int l = top; l > 0; --l) end[l - 1] = std::min(num_rows, end[l] + kRadii[l]);
+    for (int l = top; l > 0; --l) end[l - 1] = std::min(num_rows, end[l] + blurs_.radii[l]);
     for (int l = 0; l <= top; ++l) {
       while (num_done[l] < end[l]) {
         const int num = std::min(kSiftBatchRows, end[l] - num_done[l]);

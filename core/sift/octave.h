@@ -9,13 +9,21 @@
 
 namespace cairn {
 
-// What of an octave is computed, in its own pixels: those of octave 0 are half of the image's, and each
-// octave has pixels twice as large as the one before.
+inline constexpr double kSiftSigma = 1.6;  // of level 0, pixels of the octave [Lowe04 §3.3]
+
+// What the first level of an octave is blurred from.
+enum class OctaveSource { kDoubledImage, kImage, kOctaveBefore };
+
+// What of an octave is computed, in its own pixels.  Octave o finds features of sigma 2^o to 2^(o + 1) times
+// 0.8 px of the image.
 struct OctavePlan {
   int octave = 0;
-  cv::Size size;    // of the whole octave
-  cv::Rect window;  // whose levels are computed
-  cv::Rect sought;  // where extrema are sought; empty: only the next octave's beginning is wanted
+  OctaveSource source = OctaveSource::kDoubledImage;
+  float pixel = 0.5f;         // its pixels' width, pixels of the image
+  double sigma = kSiftSigma;  // of level 0, its pixels
+  cv::Size size;              // of the whole octave
+  cv::Rect window;            // whose levels are computed
+  cv::Rect sought;            // where extrema are sought; empty: only the next octave's beginning is wanted
 };
 
 struct SiftThresholds {
@@ -35,6 +43,8 @@ struct SiftExtremum {
   float response = 0;      // absolute value of the difference of Gaussians there, grey levels / 255
 };
 
+struct OctaveBlurs;  // octave.cc
+
 // The Gaussian levels of a window of one octave.  Levels 1 to kSiftLayers, from which keypoints are
 // described, have all their rows; the others the last few.
 class Octave {
@@ -45,8 +55,8 @@ class Octave {
   // REQUIRES: `memory` begins with a cache line, and all its values are finite
   Octave(const OctavePlan& plan, float* memory, const SiftKernels& kernels);
 
-  // Computes the levels from the image (octave 0) or from the octave before, which has to be computed, and
-  // appends the extrema sought.  Rows of all levels advance together, so that they are read from a near
+  // Computes the levels from the image or from the octave before, which has to be computed, and appends the
+  // extrema sought.  Rows of all levels advance together, so that they are read from a near
   // cache.
   void Sweep(const cv::Mat& grey, const SiftThresholds& thresholds, std::vector<SiftExtremum>* extrema);
   void Sweep(const Octave& before, const SiftThresholds& thresholds, std::vector<SiftExtremum>* extrema);
@@ -77,7 +87,8 @@ class Octave {
   const SiftKernels& kernels_;
   int64_t stride_ = 0;
   std::array<Level, kSiftLevels> levels_;
-  float* doubled_ = nullptr;  // rows of the doubled image, of octave 0
+  const OctaveBlurs& blurs_;
+  float* image_rows_ = nullptr;  // of the image, or of the doubled image, where the octave is made of it
   float* padded_ = nullptr;
   SiftCandidate* found_ = nullptr;  // scratch
 };
@@ -87,6 +98,8 @@ int NumOctaves(cv::Size image);
 
 // How far a refinement may lead from the pixel where it begins.
 inline constexpr int kSiftMaxDrift = 5;
+// How far a pixel of level 0 reaches in the image that it is blurred from, with the pixel that doubling adds.
+inline constexpr int kSiftImageReach = 8;
 // How far a pixel of level kSiftLayers reaches in level 0, and one of the topmost.
 inline constexpr int kSiftLevelReach = 5 + 6 + 8;
 inline constexpr int kSiftTopReach = kSiftLevelReach + 10 + 13;

@@ -10,9 +10,8 @@
 namespace cairn {
 namespace {
 
-constexpr int kMaxSteps = 5;    // as OpenCV
-constexpr int kBorder = 5;      // pixels of the octave without keypoints, as OpenCV
-constexpr double kSigma = 1.6;  // of level 0 [Lowe04 §3.3]
+constexpr int kMaxSteps = 5;  // as OpenCV
+constexpr int kBorder = 5;    // pixels of the octave without keypoints, as OpenCV
 constexpr float kPerGrey = 1 / 255.0f;
 
 struct Place {
@@ -103,7 +102,7 @@ std::optional<SiftExtremum> RefineExtremum(const Octave& octave, int layer, int 
       if (std::abs(contrast) * kSiftLayers < static_cast<float>(thresholds.contrast)) return std::nullopt;
       if (IsOnEdge(parabola, thresholds.edge)) return std::nullopt;
       const int octave_x = place.x + octave.window().x, octave_y = place.y + octave.window().y;
-      const double sigma = kSigma * ExactExp2((place.layer + offset.layer) / kSiftLayers);
+      const double sigma = octave.plan().sigma * ExactExp2((place.layer + offset.layer) / kSiftLayers);
       return SiftExtremum{.octave = octave.plan().octave,
                           .layer = place.layer,
                           .x = octave_x,

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace cairn {
 namespace {
@@ -96,6 +97,83 @@ TEST(ExtractSift, TinyImagesHaveNoFeatures) {
 TEST(ExtractSift, ColourImageIsAnError) {
   EXPECT_EQ(ExtractSift(cv::Mat(50, 50, CV_8UC3), {}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ExtractSift(cv::Mat(), {}).error().code, ErrorCode::kInvalidArgument);
+}
+
+// The keypoint nearest to a place.
+Keypoint NearestTo(double x, double y, const Features& features) {
+  EXPECT_FALSE(features.keypoints.empty());
+  Keypoint nearest;
+  for (const Keypoint& keypoint : features.keypoints) {
+    if (std::hypot(keypoint.x - x, keypoint.y - y) < std::hypot(nearest.x - x, nearest.y - y))
+      nearest = keypoint;
+  }
+  return nearest;
+}
+
+TEST(ExtractUndoubledSift, FindsBlobsInColmapsPixelsByTheirScales) {
+  for (const double sigma : {1.2, 4.0}) {
+    const SiftScales scales = sigma < 1.8 ? SiftScales::kFine : SiftScales::kCoarse;
+    const auto features = ExtractUndoubledSift(Blob(60.25, 44.75, sigma), {}, scales);
+    ASSERT_TRUE(features.ok());
+    const Keypoint nearest = NearestTo(60.25, 44.75, *features);
+    EXPECT_NEAR(nearest.x, 60.25, 0.06) << sigma;
+    EXPECT_NEAR(nearest.y, 44.75, 0.06) << sigma;
+    EXPECT_NEAR(nearest.scale, sigma, 0.2 * sigma);
+  }
+}
+
+// A picture with features of all scales.
+cv::Mat Blobs() {
+  cv::Mat image(300, 400, CV_8UC1, cv::Scalar(60));
+  for (int i = 0; i < 150; ++i) {
+    cv::circle(image, {(37 * i) % 400, (101 * i) % 300}, 1 + i % 12, cv::Scalar(60 + (83 * i) % 180),
+               cv::FILLED);
+  }
+  return image;
+}
+
+TEST(ExtractUndoubledSift, CoarseFeaturesAreAboveAScaleAndFineOnesBelow) {
+  const cv::Mat image = Blobs();
+  for (const int max_side : {3200, 200}) {
+    const SiftOptions options{.max_image_side_px = max_side};
+    const double limit = CoarseSiftScalePx(image.size(), options);
+    EXPECT_NEAR(limit, max_side == 200 ? 3.592 : 1.796, 1e-3);
+    const auto coarse = ExtractUndoubledSift(image, options, SiftScales::kCoarse),
+               fine = ExtractUndoubledSift(image, options, SiftScales::kFine);
+    ASSERT_GT(coarse->keypoints.size(), 50u);
+    ASSERT_GT(fine->keypoints.size(), 50u);
+    // Half a layer of rounding to either side.
+    for (const Keypoint& keypoint : coarse->keypoints) EXPECT_GE(keypoint.scale, 0.999 * limit);
+    for (const Keypoint& keypoint : fine->keypoints) EXPECT_LE(keypoint.scale, 1.13 * limit);
+    EXPECT_EQ(coarse->descriptors.rows(), static_cast<Eigen::Index>(coarse->keypoints.size()));
+  }
+}
+
+TEST(ExtractUndoubledSift, WantedFeaturesAreAskedForInPixelsOfTheWholeImage) {
+  const cv::Mat image = Blobs();
+  const auto is_wanted = [](const Keypoint& keypoint) { return keypoint.x < 150 && keypoint.scale > 3; };
+  for (const int max_side : {3200, 200}) {
+    const SiftOptions options{.max_image_side_px = max_side};
+    const auto all = ExtractUndoubledSift(image, options, SiftScales::kCoarse),
+               wanted = ExtractUndoubledSift(image, options, SiftScales::kCoarse, is_wanted);
+    std::vector<float> expected, found;
+    for (const Keypoint& keypoint : all->keypoints) {
+      if (is_wanted(keypoint)) expected.push_back(keypoint.x);
+    }
+    for (const Keypoint& keypoint : wanted->keypoints) found.push_back(keypoint.x);
+    EXPECT_EQ(found, expected);
+    EXPECT_GT(found.size(), 10u);
+    EXPECT_LT(found.size(), all->keypoints.size() / 2);
+  }
+}
+
+TEST(ExtractUndoubledSift, RefusesWhatIsNotGreyAndFindsNothingInTinyImages) {
+  EXPECT_EQ(ExtractUndoubledSift(cv::Mat(50, 50, CV_8UC3), {}, SiftScales::kFine).error().code,
+            ErrorCode::kInvalidArgument);
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(5, 500), cv::Size(10, 10)}) {
+    for (const SiftScales scales : {SiftScales::kCoarse, SiftScales::kFine})
+      EXPECT_TRUE(ExtractUndoubledSift(cv::Mat(size, CV_8UC1, cv::Scalar(7)), {}, scales)->keypoints.empty());
+  }
 }
 
 }  // namespace

@@ -120,10 +120,12 @@ TEST(FindSift, ValuesAreFiniteAndInOrder) {
 TEST(FindSift, EveryInstructionSetGivesTheSameFeatures) {
   for (const cv::Mat& grey :
        {RandomBlobs({333, 247}, 400, 4), Noise({97, 61}, 1), Checkerboard({200, 300}, 17)}) {
-    const std::vector<SiftFeature> expected = FindSift(grey, {}, {}, kSiftPortable);
-    EXPECT_GT(expected.size(), 15u);
-    for (const SiftKernels* kernels : UsableSiftKernels())
-      EXPECT_EQ(FindSift(grey, {}, {}, *kernels), expected) << kernels->name;
+    for (const bool doubled : {true, false}) {
+      const std::vector<SiftFeature> expected = FindSift(grey, {}, {.doubled = doubled}, kSiftPortable);
+      EXPECT_GT(expected.size(), 15u);
+      for (const SiftKernels* kernels : UsableSiftKernels())
+        EXPECT_EQ(FindSift(grey, {}, {.doubled = doubled}, *kernels), expected) << kernels->name;
+    }
   }
 }
 
@@ -149,9 +151,16 @@ bool IsIn(const SiftFeature& f, const cv::Rect& region) {
          f.y >= static_cast<float>(region.y) && f.y < static_cast<float>(region.br().y);
 }
 
-TEST(FindSift, FeaturesOfARegionAreThoseOfTheWholeImageThere) {
+class FindSiftInPart : public testing::TestWithParam<bool> {
+ protected:
+  const bool doubled_ = GetParam();
+};
+INSTANTIATE_TEST_SUITE_P(, FindSiftInPart, testing::Bool(),
+                         [](const auto& info) { return std::string(info.param ? "Doubled" : "NotDoubled"); });
+
+TEST_P(FindSiftInPart, FeaturesOfARegionAreThoseOfTheWholeImageThere) {
   const cv::Mat grey = RandomBlobs({720, 560}, 2500, 8);
-  const std::vector<SiftFeature> whole = Find(grey);
+  const std::vector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
   size_t num_compared = 0;
   for (const cv::Rect region :
        {cv::Rect(300, 250, 60, 40), cv::Rect(0, 0, 100, 90), cv::Rect(601, 401, 119, 159),
@@ -162,20 +171,22 @@ TEST(FindSift, FeaturesOfARegionAreThoseOfTheWholeImageThere) {
       std::copy_if(whole.begin(), whole.end(), std::back_inserter(expected), [&](const SiftFeature& f) {
         return IsIn(f, region) && f.octave >= first && f.octave < end;
       });
-      EXPECT_EQ(Find(grey, {.first_octave = first, .end_octave = end, .region = region}), expected)
+      EXPECT_EQ(Find(grey, {.doubled = doubled_, .first_octave = first, .end_octave = end, .region = region}),
+                expected)
           << region << " octaves " << first << " to " << end;
       num_compared += expected.size();
     }
   }
   EXPECT_GT(num_compared, 3000u);
-  EXPECT_TRUE(Find(grey, {.region = cv::Rect(720, 0, 50, 50)}).empty());
-  EXPECT_TRUE(Find(grey, {.first_octave = 50}).empty());
+  EXPECT_TRUE(Find(grey, {.doubled = doubled_, .region = cv::Rect(720, 0, 50, 50)}).empty());
+  EXPECT_TRUE(Find(grey, {.doubled = doubled_, .first_octave = 50}).empty());
+  EXPECT_TRUE(Find(grey, {.doubled = doubled_, .end_octave = 0}).empty());
 }
 
 // Those whose support is the largest, with nothing computed that they do not need.
-TEST(FindSift, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
+TEST_P(FindSiftInPart, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
   const cv::Mat grey = RandomBlobs({900, 700}, 3000, 13);
-  std::vector<SiftFeature> whole = Find(grey);
+  std::vector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
   const auto octave_size = [](const SiftFeature& f) { return std::ldexp(f.size, -f.octave); };
   std::stable_sort(whole.begin(), whole.end(), [&](const auto& a, const auto& b) {
     return std::tuple(a.octave, octave_size(b)) < std::tuple(b.octave, octave_size(a));
@@ -186,8 +197,8 @@ TEST(FindSift, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
       if (f.octave != octave || num_tried >= 20) continue;
       ++num_tried;
       const cv::Rect pixel(static_cast<int>(f.x), static_cast<int>(f.y), 1, 1);
-      const std::vector<SiftFeature> found =
-          Find(grey, {.first_octave = octave, .end_octave = octave + 1, .region = pixel});
+      const std::vector<SiftFeature> found = Find(
+          grey, {.doubled = doubled_, .first_octave = octave, .end_octave = octave + 1, .region = pixel});
       EXPECT_TRUE(std::find(found.begin(), found.end(), f) != found.end()) << f.x << " " << f.y;
     }
     EXPECT_GE(num_tried, 8) << octave;
@@ -222,6 +233,81 @@ TEST(FindSift, MaskedFeaturesAreDroppedBeforeTheStrongestAreKept) {
   EXPECT_EQ(static_cast<int64_t>(right.size()), num_right);
   EXPECT_TRUE(std::all_of(right.begin(), right.end(), [](const auto& f) { return f.x >= 149.5f; }));
   EXPECT_EQ(FindSift(grey, mask, {.max_num_features = 20}).size(), 20u);
+}
+
+TEST_P(FindSiftInPart, OfAllFeaturesThoseWantedAreTheSameBits) {
+  const cv::Mat grey = RandomBlobs({400, 300}, 500, 9);
+  const auto is_wanted = [](float x, float y, float size) { return x > 2 * y && size < 5; };
+  std::vector<SiftFeature> expected = Find(grey, {.doubled = doubled_});
+  const size_t num_all = expected.size();
+  std::erase_if(expected, [&](const SiftFeature& f) { return !is_wanted(f.x, f.y, f.size); });
+  EXPECT_EQ(Find(grey, {.doubled = doubled_, .is_wanted = is_wanted}), expected);
+  EXPECT_GT(expected.size(), 50u);
+  EXPECT_LT(expected.size(), num_all / 2);
+  // The strongest are chosen of those.
+  EXPECT_EQ(Find(grey, {.max_num_features = 20, .doubled = doubled_, .is_wanted = is_wanted}).size(), 20u);
+}
+
+// Of features of the doubled image: how many there are without doubling, within half a pixel, 10 % of size
+// and 10 degrees, how far from them on the mean, and with which distance of descriptors.
+struct Likeness {
+  double found_ratio = 0;
+  double x = 0, y = 0;
+  double size_ratio = 0;
+  double distance = 0;
+};
+Likeness LikenessWithoutDoubling(const cv::Mat& grey, int first, int end) {
+  const SiftSearch search{.first_octave = first, .end_octave = end};
+  SiftSearch plain = search;
+  plain.doubled = false;
+  const std::vector<SiftFeature> doubled = Find(grey, search), own = Find(grey, plain);
+  Likeness likeness;
+  int num_found = 0;
+  for (const SiftFeature& f : doubled) {
+    const auto match = std::find_if(own.begin(), own.end(), [&](const SiftFeature& g) {
+      return g.octave == f.octave && std::hypot(g.x - f.x, g.y - f.y) < 0.5 &&
+             std::abs(g.size / f.size - 1) < 0.1 && AngleBetween(g.angle_deg, f.angle_deg) < 10;
+    });
+    if (match == own.end()) continue;
+    ++num_found;
+    likeness.x += match->x - f.x;
+    likeness.y += match->y - f.y;
+    likeness.size_ratio += match->size / f.size;
+    double squared = 0;
+    for (int d = 0; d < kSiftDim; ++d) squared += std::pow(match->root_sift[d] - f.root_sift[d], 2);
+    likeness.distance += std::sqrt(squared) / 512;
+  }
+  for (double* sum : {&likeness.x, &likeness.y, &likeness.size_ratio, &likeness.distance}) *sum /= num_found;
+  likeness.found_ratio = static_cast<double>(num_found) / static_cast<double>(doubled.size());
+  EXPECT_NEAR(static_cast<double>(own.size()) / static_cast<double>(doubled.size()), 1, 0.15);
+  return likeness;
+}
+
+TEST(FindSift, WithoutDoublingMostFeaturesAreWhereTheyAreWithIt) {
+  const cv::Mat grey = RandomBlobs({640, 480}, 2500, 14);
+  for (const auto& [first, end] : {std::pair(0, 1), std::pair(1, 2), std::pair(2, 99)}) {
+    const Likeness likeness = LikenessWithoutDoubling(grey, first, end);
+    // Octave 0 has half of the pixels for each sigma.
+    EXPECT_GT(likeness.found_ratio, first == 0 ? 0.55 : 0.8) << first;
+    EXPECT_NEAR(likeness.x, 0, 0.01) << first;
+    EXPECT_NEAR(likeness.y, 0, 0.01) << first;
+    EXPECT_NEAR(likeness.size_ratio, 1, 0.01) << first;
+    EXPECT_LT(likeness.distance, first == 0 ? 0.13 : 0.1) << first;
+  }
+}
+
+TEST(FindSift, WithoutDoublingImagesOfHostileSizesAreSearched) {
+  for (const cv::Size size : {cv::Size(6, 6), cv::Size(11, 13), cv::Size(2000, 7), cv::Size(7, 2000),
+                              cv::Size(31, 33), cv::Size(65, 17), cv::Size(300, 12)}) {
+    const cv::Mat grey = Noise(size, 5);
+    const std::vector<SiftFeature> features = Find(grey, {.doubled = false});
+    for (const SiftFeature& f : features) {
+      EXPECT_TRUE(std::isfinite(f.size + f.response));
+      EXPECT_TRUE(IsIn(f, cv::Rect({0, 0}, size))) << size;
+    }
+    if (std::min(size.width, size.height) <= 10) EXPECT_TRUE(features.empty()) << size;  // all border
+    if (size.width > 20 && size.height > 20) EXPECT_FALSE(features.empty()) << size;
+  }
 }
 
 // In octaves up to 2, whose pixels are at most two of the image's.
