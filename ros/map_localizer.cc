@@ -109,30 +109,32 @@ struct MapLocalizer::State {
   // By the features that a log and a belief need, too.
   Result<Localization> LocateByFeatures(const cv::Mat& grey, const Camera& camera, double stamp_s,
                                         std::optional<Places>* places) {
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
-    CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow
-                                                   ? tracker.TrackFeatures(query.features, camera)
-                                                   : localizer.LocalizeQuery(query, std::nullopt));
+    QueryFrame frame(localizer, grey, camera);
+    const auto by_itself = [&]() -> Result<Localization> {
+      CAIRN_ASSIGN_OR_RETURN(const Query* query, frame.WithAllFeatures());
+      return localizer.LocalizeQuery(*query, std::nullopt);
+    };
+    CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow ? tracker.TrackFrame(&frame) : by_itself());
     if (whereabouts) {
-      CAIRN_RETURN_IF_ERROR(Believe(query, camera, stamp_s, &found, places));
+      CAIRN_RETURN_IF_ERROR(Believe(&frame, stamp_s, &found, places));
     }
-    if (log) log->Offer(query, found);
+    if (log) log->Offer(&frame, found);
     return found;
   }
 
   // What the frame says of places, and whether its fix, if it has one, is sure.
-  Status Believe(const Query& query, const Camera& camera, double stamp_s, Localization* found,
-                 std::optional<Places>* places) {
+  Status Believe(QueryFrame* frame, double stamp_s, Localization* found, std::optional<Places>* places) {
     const double needed = parameters.min_place_probability;
     const bool is_followed = found->scope == Scope::kTrack;
     const bool is_awaited = needed > 0 && (place_probability < needed || !is_followed);
     if (is_awaited || whereabouts->IsDue(stamp_s)) {
       // What a tracker expected has been in the belief already: the image by itself counts.
+      CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
       Localization alone = *found;
       if (is_followed) {
-        CAIRN_ASSIGN_OR_RETURN(alone, localizer.LocalizeQuery(query, std::nullopt));
+        CAIRN_ASSIGN_OR_RETURN(alone, localizer.LocalizeQuery(*query, std::nullopt));
       }
-      *places = whereabouts->See(query, alone, stamp_s);
+      *places = whereabouts->See(*query, alone, stamp_s);
       const auto probability_of = [&](const Localization& fix) {
         const bool is_known = fix.has_fix() && (*places)->error.empty();
         return is_known ? whereabouts->ProbabilityAround(fix.cam_from_world) : 0;
@@ -140,7 +142,7 @@ struct MapLocalizer::State {
       place_probability = probability_of(*found);
       if (needed > 0 && is_followed && place_probability < needed && probability_of(alone) >= needed) {
         tracker = RegionTracker(map);  // it followed a look-alike
-        CAIRN_ASSIGN_OR_RETURN(*found, tracker.TrackFeatures(query.features, camera));
+        CAIRN_ASSIGN_OR_RETURN(*found, tracker.TrackFrame(frame));
         place_probability = probability_of(*found);
       }
     }

@@ -23,6 +23,7 @@
 #include "pipeline/commands/query_images.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
+#include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/robot_log/robot_log.h"
 
@@ -37,7 +38,7 @@ struct Answer {
   std::optional<Result<TrackedVisualPose>> visual;
   std::optional<Disagreement> disagreement;  // where both have a fix
   std::optional<UncertainPose> believed;     // without a fix: where odometry has the camera
-  std::optional<Query> query;                // where frames are logged
+  std::optional<QueryFrame> frame;           // where frames are logged
 };
 
 // What follows a camera from frame to frame; none where there is no sequence.
@@ -96,19 +97,20 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     const Localizer localizer(map, arguments.options);
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
-    if (!arguments.log_folder.empty()) answer.query = query;
+    answer.frame.emplace(localizer, grey, camera);
+    CAIRN_ASSIGN_OR_RETURN(const Query* query, answer.frame->WithAllFeatures());
     if (trackers->in_space) {
-      CAIRN_ASSIGN_OR_RETURN(answer.localization, trackers->in_space->TrackFeatures(query.features, camera));
+      CAIRN_ASSIGN_OR_RETURN(answer.localization, trackers->in_space->TrackFrame(&*answer.frame));
     } else if (arguments.estimator == "both") {
-      CAIRN_ASSIGN_OR_RETURN(answer.localization, localizer.LocalizeQuery(query, std::nullopt));
+      CAIRN_ASSIGN_OR_RETURN(answer.localization, localizer.LocalizeQuery(*query, std::nullopt));
     }
-    if (trackers->on_floor) return trackers->on_floor->See(query);
-    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(query));
+    if (trackers->on_floor) return trackers->on_floor->See(*query);
+    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(*query));
     CAIRN_ASSIGN_OR_RETURN(VisualPose pose, EstimateVisualPose(visual, seen, arguments.estimate_options));
     return TrackedVisualPose{std::move(pose)};
   };
   answer.visual = locate();
+  if (arguments.log_folder.empty()) answer.frame.reset();
   answer.believed = trackers->Believed(answer.localization);
   if (!answer.visual->ok()) {
     answer.localization = answer.visual->error();
@@ -130,8 +132,9 @@ Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>&
     answer.camera_id = camera.camera_id;
     Localizer localizer(map, arguments.options);
     if (arguments.log_folder.empty()) return localizer.Localize(grey, camera);
-    CAIRN_ASSIGN_OR_RETURN(answer.query, localizer.QueryFromImage(grey, camera));
-    return localizer.LocalizeQuery(*answer.query, std::nullopt);
+    answer.frame.emplace(localizer, grey, camera);
+    CAIRN_ASSIGN_OR_RETURN(const Query* query, answer.frame->WithAllFeatures());
+    return localizer.LocalizeQuery(*query, std::nullopt);
   }();
   return answer;
 }
@@ -147,8 +150,8 @@ Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& ma
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     if (arguments.log_folder.empty()) return tracker->Track(grey, camera);
-    CAIRN_ASSIGN_OR_RETURN(answer.query, Localizer(map, arguments.options).QueryFromImage(grey, camera));
-    return tracker->TrackFeatures(answer.query->features, camera);
+    answer.frame.emplace(Localizer(map, arguments.options), grey, camera);
+    return tracker->TrackFrame(&*answer.frame);
   }();
   answer.believed = trackers->Believed(answer.localization);
   return answer;
@@ -194,13 +197,19 @@ Result<std::optional<RobotLog>> OpenLog(const LocalizeArguments& arguments, cons
 }
 
 // A log that can no longer be written does not keep a robot from knowing where it is.
-void OfferToLog(const Answer& answer, std::optional<RobotLog>* log) {
-  if (!*log || !answer.query || !answer.localization.ok() || !answer.localization->has_fix()) return;
-  const Result<bool> kept = (*log)->Offer({.features = &answer.query->features,
-                                           .camera = &answer.query->camera,
-                                           .cam_from_world = answer.localization->cam_from_world,
-                                           .image_path = answer.image},
-                                          ReadMachineClocks());
+void OfferToLog(Answer* answer, std::optional<RobotLog>* log) {
+  if (!*log || !answer->frame || !answer->localization.ok() || !answer->localization->has_fix()) return;
+  const Pose& cam_from_world = answer->localization->cam_from_world;
+  const MachineClocks now = ReadMachineClocks();
+  const Result<bool> kept = [&]() -> Result<bool> {
+    if (!(*log)->IsWanted(cam_from_world, now)) return false;
+    CAIRN_ASSIGN_OR_RETURN(const Query* query, answer->frame->WithAllFeatures());
+    return (*log)->Offer({.features = &query->features,
+                          .camera = &query->camera,
+                          .cam_from_world = cam_from_world,
+                          .image_path = answer->image},
+                         now);
+  }();
   if (kept.ok()) return;
   spdlog::warn("nothing is logged from here on: {}", kept.error().message);
   log->reset();
@@ -241,9 +250,9 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
                    : arguments.is_sequence ? TrackImage(batch[i], map, cameras, arguments, &trackers)
                                            : LocalizeImage(batch[i], map, cameras, arguments);
     });
-    for (const Answer& answer : answers) {
+    for (Answer& answer : answers) {
       *environment.out << JsonText(AnswerJson(answer, arguments)) << "\n" << std::flush;
-      OfferToLog(answer, &log);
+      OfferToLog(&answer, &log);
       ++num_images;
       if (answer.visual && answer.visual->ok() && (*answer.visual)->pose.flag == VisualFlag::kNone)
         ++num_places;

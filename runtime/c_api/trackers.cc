@@ -100,16 +100,10 @@ int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image, co
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
-    if (!used->log) {
-      CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->Track(grey, chosen));
-      Return(FixFrom(found), fix);
-      return Ok();
-    }
-    const Localizer localizer(used->map, used->options.localizer);
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, chosen));
-    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->TrackFeatures(query.features, chosen));
+    QueryFrame frame(Localizer(used->map, used->options.localizer), grey, chosen);
+    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->TrackFrame(&frame));
     Return(FixFrom(found), fix);
-    used->log->Offer(query, found);
+    if (used->log) used->log->Offer(&frame, found);
     return Ok();
   });
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/quantiles.h"
+#include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "core/promise/view_distance.h"
 #include "runtime/localize/retrieve.h"

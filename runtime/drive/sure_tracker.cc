@@ -111,17 +111,19 @@ Status SureTracker::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_de
 }
 
 Result<Localization> SureTracker::Track(const cv::Mat& grey, const Camera& camera) {
-  return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(Query query, localizer_.QueryFromImage(grey, camera));
-    return TrackFeatures(std::move(query.features), camera);
-  });
+  QueryFrame frame(localizer_, grey, camera);
+  return TrackFrame(&frame);
 }
 
 Result<Localization> SureTracker::TrackFeatures(Features features, const Camera& camera) {
+  QueryFrame frame(localizer_, std::move(features), camera);
+  return TrackFrame(&frame);
+}
+
+Result<Localization> SureTracker::TrackFrame(QueryFrame* frame) {
   return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
-    if (!belief_) return tracker_->TrackFeatures(std::move(features), camera);
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromFeatures(features, camera));
-    CAIRN_ASSIGN_OR_RETURN(Localization found, tracker_->TrackFeatures(features, camera));
+    CAIRN_ASSIGN_OR_RETURN(Localization found, tracker_->TrackFrame(frame));
+    if (!belief_) return found;
     if (elapsed_s_) {
       since_look_s_ += *std::exchange(elapsed_s_, std::nullopt);
     } else {  // as PlaceBelief has it
@@ -132,13 +134,14 @@ Result<Localization> SureTracker::TrackFeatures(Features features, const Camera&
     const bool is_followed = found.has_fix() && found.scope == Scope::kTrack;
     if (!is_followed || sure_probability_ == 0 || since_look_s_ >= options_.look_anew_s) {
       if (up) CAIRN_RETURN_IF_ERROR(belief_->SenseUp(up->first, up->second));
-      CAIRN_ASSIGN_OR_RETURN(const Localization anew, LookAnew(query, found));
+      CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
+      CAIRN_ASSIGN_OR_RETURN(const Localization anew, LookAnew(*query, found));
       sure_probability_ = ProbabilityOf(found);
       const double elsewhere = ProbabilityOf(anew);
       if (is_followed && sure_probability_ < options_.min_place_probability &&
           elsewhere >= options_.min_place_probability) {  // it followed a look-alike
         tracker_.emplace(map_, localizer_options_, tracker_options_);
-        CAIRN_ASSIGN_OR_RETURN(found, tracker_->TrackFeatures(std::move(features), camera));
+        CAIRN_ASSIGN_OR_RETURN(found, tracker_->TrackFrame(frame));
         sure_probability_ = ProbabilityOf(found);
       }
     }

@@ -60,6 +60,7 @@ class SureTracker {
   // to be damaged, the tracker may have taken the frame in already.
   Result<Localization> Track(const cv::Mat& grey, const Camera& camera);
   Result<Localization> TrackFeatures(Features features, const Camera& camera);
+  Result<Localization> TrackFrame(QueryFrame* frame);
 
   std::optional<PosePrior> Prediction() const { return tracker_->Prediction(); }
   std::optional<UncertainPose> Believed() const { return tracker_->Believed(); }

@@ -11,7 +11,7 @@ namespace cairn {
 namespace {
 
 // Steps after which a region's walls seen through several windows are given up.
-constexpr int kMaxSteps = 20000;
+constexpr int kMaxOrderSteps = 20000;
 
 class OrderSearch {
  public:
@@ -33,7 +33,7 @@ class OrderSearch {
   std::optional<std::vector<OrderedLabels>> Run() {
     OrderedLabels labels(segments_.size(), -1);
     for (size_t first = 0; first < walls_.size(); ++first) Extend(0, first, 0, &labels);
-    if (num_steps_ > kMaxSteps) return std::nullopt;
+    if (num_steps_ > kMaxOrderSteps) return std::nullopt;
     std::sort(found_.begin(), found_.end());
     found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
     return std::move(found_);
@@ -48,7 +48,7 @@ class OrderSearch {
 
   // Gives the segment at `place` of the order the wall `first + passed`, around the circle.
   void Extend(size_t place, size_t first, size_t passed, OrderedLabels* labels) {
-    if (++num_steps_ > kMaxSteps) return;
+    if (++num_steps_ > kMaxOrderSteps) return;
     const Wall& wall = walls_[(first + passed) % walls_.size()];
     const int segment = order_[place];
     const double heading = wall.angle - segments_[segment].Angle();

@@ -24,12 +24,6 @@
 namespace cairn {
 namespace {
 
-std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
-  std::vector<int32_t> images;
-  for (const Candidate& candidate : candidates) images.push_back(candidate.image);
-  return images;
-}
-
 std::vector<Correspondence> Select(const std::vector<Correspondence>& correspondences,
                                    const std::vector<int>& indices) {
   std::vector<Correspondence> selected;
@@ -70,24 +64,12 @@ constexpr double kUnmeasuredScale = 1.8;
 
 }  // namespace
 
-// A set of landmarks to match.
-struct Localizer::Attempt {
-  Scope scope = Scope::kAll;
-  std::vector<LandmarkIdx> landmarks;  // ascending
-};
-
 // What a first pose leads to: its own inliers, or what guided matching finds among the landmarks covisible
 // with them, if that is no less.
 struct Localizer::FollowedUp {
   int num_unguided_inliers = 0;
   std::shared_ptr<const LandmarkSet> covisible;  // null: its own inliers
   GuidedMatches found;
-};
-
-// A pose, and the survey images near it.
-struct Localizer::PlaceToTry {
-  Pose cam_from_world;
-  std::vector<Candidate> near;
 };
 
 const char* ScopeName(Scope scope) {
@@ -137,15 +119,36 @@ Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera
   });
 }
 
-Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+Status Localizer::CheckImage(const cv::Mat& grey, const Camera& camera) const {
   CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-  if (grey.cols != camera.width || grey.rows != camera.height) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
-                     camera.width, camera.height);
-  }
+  if (grey.cols == camera.width && grey.rows == camera.height) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
+                   camera.width, camera.height);
+}
+
+Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckImage(grey, camera));
   CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
   return QueryFromFeatures(std::move(features), camera);
+}
+
+Result<Query> Localizer::CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckImage(grey, camera));
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractUndoubledSift(grey, options_.sift, SiftScales::kCoarse));
+  CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(features), camera));
+  query.min_scale_px = CoarseSiftScalePx(grey.size(), options_.sift);
+  return query;
+}
+
+Status Localizer::AddFineFeatures(const cv::Mat& grey, int max_num,
+                                  const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const {
+  SiftOptions sift = options_.sift;
+  sift.max_num_features = std::min(sift.max_num_features, max_num);
+  CAIRN_ASSIGN_OR_RETURN(const Features features,
+                         ExtractUndoubledSift(grey, sift, SiftScales::kFine, is_wanted));
+  AddFeatures(features, options_.measurement, query);
+  return Ok();
 }
 
 Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& camera) const {
@@ -206,90 +209,41 @@ Result<Localization> Localizer::Answer(const Query& query, const std::optional<P
   localization.num_features = static_cast<int>(query.features.keypoints.size());
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
   for (Pose& pose : localization.possible_poses) pose = given_from_camera * pose;
-  if (localization.has_fix()) {
-    localization.cam_from_world = given_from_camera * localization.cam_from_world;
-    localization.covariance = TransformCovariance(given_from_camera, localization.covariance);
-    // The camera's place C is scale_centre + (1 + e) (C - scale_centre), and its translation is -R C.
-    const Pose& found = localization.cam_from_world;
-    localization.scale_sigma_m = -(found.rotation * ScaleSigmaAt(map_->head().frame, found.Center()));
-    localization.covariance.bottomRightCorner<3, 3>() +=
-        localization.scale_sigma_m * localization.scale_sigma_m.transpose();
-  }
+  if (localization.has_fix()) PutInGivenFrame(&localization);
   return localization;
 }
 
-Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
-    const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
+void Localizer::PutInGivenFrame(Localization* fix) const {
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
-  std::vector<PlaceToTry> places;
-  const auto add = [&](const Pose& pose) -> Status {
-    CAIRN_ASSIGN_OR_RETURN(auto near,
-                           RetrieveByPrior(*map_, {given_from_camera * pose, 0, 0}, options_.retrieve));
-    places.push_back({pose, std::move(near)});
-    return Ok();
-  };
-  for (const Pose& pose : poses) CAIRN_RETURN_IF_ERROR(add(pose));
-  std::vector<int32_t> possible;  // by the prior
-  if (prior) {
-    RetrieveOptions retrieve = options_.retrieve;
-    retrieve.max_num_candidates = std::numeric_limits<int>::max();
-    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, *prior, retrieve));
-    possible = ImagesOf(candidates);
-    std::sort(possible.begin(), possible.end());
-  }
-  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
-  for (size_t i = 0; i < poses.size(); ++i) {
-    if (places[i].near.empty()) continue;
-    const int32_t image = places[i].near[0].image;
-    const NodeIdx node = appearance->node_of_image[image];
-    if (node < 0) continue;
-    CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
-    const Pose cam_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
-    for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
-      const int32_t other = appearance->node_images[look_alike.node].front();
-      if (prior && !std::binary_search(possible.begin(), possible.end(), other)) continue;
-      CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(other));
-      const Pose there = cam_from_nearest * other_image->cam_from_world;
-      // Of a place many images look alike.
-      const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
-        return !AreFarApart(place.cam_from_world, there, options_.accept);
-      });
-      if (!is_known) CAIRN_RETURN_IF_ERROR(add(there));
-    }
-  }
-  return places;
+  fix->cam_from_world = given_from_camera * fix->cam_from_world;
+  fix->covariance = TransformCovariance(given_from_camera, fix->covariance);
+  // The camera's place C is scale_centre + (1 + e) (C - scale_centre), and its translation is -R C.
+  const Pose& found = fix->cam_from_world;
+  fix->scale_sigma_m = -(found.rotation * ScaleSigmaAt(map_->head().frame, found.Center()));
+  fix->covariance.bottomRightCorner<3, 3>() += fix->scale_sigma_m * fix->scale_sigma_m.transpose();
 }
 
-Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
-                                                  Localization best) const {
-  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
-  const std::vector<Pose> poses =
-      best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(poses, prior));
-  if (places.size() == poses.size()) return best;
-  // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
-  // are among them, no match is much better than the next best.
-  std::vector<Localization> found;
-  bool is_confirmed = true;
-  for (size_t i = 0; i < places.size(); ++i) {
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(places[i].near)));
-    Localization here;
-    if (!landmarks.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(here, Try(query, {Scope::kImages, std::move(landmarks)}));
-    }
-    const bool is_new = i >= poses.size();
-    const bool is_here =
-        here.has_fix() && !AreFarApart(here.cam_from_world, places[i].cam_from_world, options_.accept);
-    is_confirmed = is_confirmed && (is_new || is_here);
-    if (is_here || (is_new && here.has_places())) found.push_back(std::move(here));
-  }
-  if (!is_confirmed) found.insert(found.begin(), best);
-  Localization decided = DecideAmong(found, options_.min_look_alike_odds, options_.accept);
-  if (!best.has_fix() || !decided.has_fix() ||
-      AreFarApart(decided.cam_from_world, best.cam_from_world, options_.accept))
-    return decided;
-  best.probability = decided.probability;
-  return best;
+Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& landmarks,
+                                        Localization fix) const {
+  fix.num_features = static_cast<int>(query.features.keypoints.size());
+  const Pose first = map_->head().camera_from_given * fix.cam_from_world;
+  const std::vector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
+  const auto refined =
+      RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first, options_.refine);
+  if (!refined || static_cast<int>(refined->inliers.size()) <= fix.num_inliers ||
+      AreFarApart(refined->cam_from_world, first, options_.accept))
+    return fix;
+  const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
+  CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
+  const Verdict verdict =
+      JudgePose(*refined, inliers, query, distance, options_.accept, LengthUnit(map_->head().frame));
+  if (verdict.reason != NoFix::kNone) return fix;
+  fix.cam_from_world = refined->cam_from_world;
+  fix.covariance = refined->covariance;
+  PutInGivenFrame(&fix);
+  fix.num_inliers = static_cast<int>(inliers.size());
+  CAIRN_ASSIGN_OR_RETURN(fix.region, RegionWithMost(*map_, LandmarksOf(inliers)));
+  return fix;
 }
 
 Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Query& query,
@@ -510,6 +464,15 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
       !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
     return std::nullopt;
   return second;
+}
+
+Result<const Query*> QueryFrame::WithAllFeatures() {
+  if (!query_) {
+    CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_)
+                                              : localizer_.QueryFromFeatures(std::move(features_), camera_));
+    query_ = std::make_shared<const Query>(std::move(query));
+  }
+  return query_.get();
 }
 
 }  // namespace cairn

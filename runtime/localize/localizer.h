@@ -1,7 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -22,6 +24,7 @@ struct Correspondence;
 struct PoseMeasurement;
 struct PoseEstimate;
 struct PlaceEvidence;
+struct LandmarkSet;  // runtime/map/landmark_set.h
 
 // Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {
@@ -43,6 +46,12 @@ class Localizer {
   // image, with their rays and packed descriptors.  Errors: as Localize.
   Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
   Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
+  // In two steps, a third of the time: its coarse features (SiftScales), then of its fine ones those that are
+  // wanted.
+  Result<Query> CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera) const;
+  // At most so many, the strongest.
+  Status AddFineFeatures(const cv::Mat& grey, int max_num,
+                         const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const;
   Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
   // The same, but these landmarks (ascending), of regions that were voted for, are matched before all others.
   Result<Localization> LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const;
@@ -51,19 +60,29 @@ class Localizer {
   Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::vector<LandmarkIdx> landmarks,
                                      const std::optional<PosePrior>& prior) const;
 
+  // A fix made more exact by what the query shows of these landmarks where it puts them: the same fix where
+  // that is no more than what it was made of.  Nothing else about it changes.
+  Result<Localization> Sharpen(const Query& query, const LandmarkSet& landmarks, Localization fix) const;
+
   const LocalizerOptions& options() const { return options_; }
 
  private:
-  struct Attempt;
+  // A set of landmarks to match.
+  struct Attempt {
+    Scope scope = Scope::kAll;
+    std::vector<LandmarkIdx> landmarks;  // ascending
+  };
   struct FollowedUp;
   struct PlaceToTry;
   // `best`: what was found before.
   Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
                                       Localization best) const;
-  // The last step of every fix: look-alikes are excluded, the pose is put into the given frame, and the
-  // error of the map's scale is added to its covariance.
+  Status CheckImage(const cv::Mat& grey, const Camera& camera) const;
+  // The last step of every fix: look-alikes are excluded, and it is put into the given frame.
   Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
                               Localization localization) const;
+  // And the error of the map's scale is added to its covariance.
+  void PutInGivenFrame(Localization* fix) const;
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
                                             std::vector<ImageId>* candidate_ids) const;
   Result<Localization> Try(const Query& query, const Attempt& attempt) const;
@@ -91,6 +110,29 @@ class Localizer {
 
   std::shared_ptr<const Map> map_;
   LocalizerOptions options_;
+};
+
+// A frame to be localized: an image, of which all features are extracted when somebody asks for them, or
+// features alone.
+class QueryFrame {
+ public:
+  QueryFrame(const Localizer& localizer, const cv::Mat& grey, const Camera& camera)
+      : localizer_(localizer), grey_(grey), camera_(camera) {}
+  QueryFrame(const Localizer& localizer, Features features, const Camera& camera)
+      : localizer_(localizer), features_(std::move(features)), camera_(camera) {}
+
+  // The image, as long as not all of its features are known; null after that, and where there is none.
+  const cv::Mat* image() const { return grey_ && !query_ ? &*grey_ : nullptr; }
+  const Camera& camera() const { return camera_; }
+  // Errors: as Localizer::QueryFromImage, QueryFromFeatures.
+  Result<const Query*> WithAllFeatures();
+
+ private:
+  Localizer localizer_;
+  std::optional<cv::Mat> grey_;
+  Features features_;
+  Camera camera_;
+  std::shared_ptr<const Query> query_;  // with all features
 };
 
 }  // namespace cairn

@@ -24,6 +24,22 @@ std::optional<Eigen::Matrix2d> PixelFromRay(const Camera& camera, const Eigen::V
   return jacobian;
 }
 
+std::vector<std::optional<QueryRay>> RaysOf(const std::vector<Keypoint>& keypoints, const Camera& camera,
+                                            const MeasurementOptions& options) {
+  std::vector<std::optional<QueryRay>> rays(keypoints.size());
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    const Keypoint& keypoint = keypoints[i];
+    const auto direction = CameraFromImage(camera, {keypoint.x, keypoint.y});
+    if (!direction) continue;
+    const auto pixel_from_ray = PixelFromRay(camera, *direction);
+    if (!pixel_from_ray) continue;
+    rays[i] =
+        QueryRay{*direction, *pixel_from_ray,
+                 std::hypot(options.keypoint_sigma_px, options.keypoint_sigma_per_scale * keypoint.scale)};
+  }
+  return rays;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(MeasurementOptions* o) {
@@ -67,18 +83,25 @@ Camera AsFound(const MapHead& head, const Camera& camera) {
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options) {
   Query query;
   query.camera = camera;
-  for (const Keypoint& keypoint : features.keypoints) {
-    std::optional<QueryRay>& ray = query.rays.emplace_back();
-    const auto direction = CameraFromImage(camera, {keypoint.x, keypoint.y});
-    if (!direction) continue;
-    const auto pixel_from_ray = PixelFromRay(camera, *direction);
-    if (!pixel_from_ray) continue;
-    ray = QueryRay{*direction, *pixel_from_ray,
-                   std::hypot(options.keypoint_sigma_px, options.keypoint_sigma_per_scale * keypoint.scale)};
-  }
+  query.rays = RaysOf(features.keypoints, camera, options);
   query.packed = PackedDescriptors(features.descriptors);
   query.features = std::move(features);
   return query;
+}
+
+void AddFeatures(const Features& features, const MeasurementOptions& options, Query* query) {
+  const auto rays = RaysOf(features.keypoints, query->camera, options);
+  query->rays.insert(query->rays.end(), rays.begin(), rays.end());
+  Features& all = query->features;
+  all.keypoints.insert(all.keypoints.end(), features.keypoints.begin(), features.keypoints.end());
+  const Eigen::Index num_before = all.descriptors.rows();
+  all.descriptors.conservativeResize(num_before + features.descriptors.rows(), Eigen::NoChange);
+  all.descriptors.bottomRows(features.descriptors.rows()) = features.descriptors;
+}
+
+bool WasLookedFor(const MapLandmark& landmark, double depth_m, const Query& query) {
+  return query.min_scale_px == 0 ||
+         landmark.scale_m * query.camera.MeanFocal() >= query.min_scale_px * depth_m;
 }
 
 std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,

@@ -16,6 +16,7 @@
 namespace cairn {
 
 struct LandmarkSet;  // runtime/map/landmark_set.h
+struct MapLandmark;  // core/packing/map_landmark.h
 
 // Whether images of such a camera can be localized.  Errors: those of CheckCamera, Unsupported (a panorama).
 Status CheckQueryCamera(const Camera& camera);
@@ -40,9 +41,19 @@ struct Query {
   Features features;
   Camera camera;
   std::vector<std::optional<QueryRay>> rays;  // per keypoint; none where the camera model has no forward ray
-  PackedDescriptors packed;                   // the features' descriptors
+  PackedDescriptors packed;                   // descriptors of the features that are matched
+  // Features of smaller scales (sigma, px) were not looked for in all of the image, and what the image should
+  // show of them is not missing.
+  double min_scale_px = 0;
 };
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options);
+// More features of the same image, behind those that the query has.  They are found by guided matching
+// alone: they are not packed.
+void AddFeatures(const Features& features, const MeasurementOptions& options, Query* query);
+
+// Whether the query would have a feature that shows a landmark which is so far away (DepthOfScale, metres).
+// Of a landmark whose size is not known only where all scales were looked for.
+bool WasLookedFor(const MapLandmark& landmark, double depth_m, const Query& query);
 
 // A keypoint that shows a landmark.
 struct Correspondence {

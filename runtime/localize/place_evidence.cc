@@ -56,8 +56,12 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const 
   CAIRN_ASSIGN_OR_RETURN(const auto expected, map.Gather(std::move(idx), false));
   std::set<int> cells_expected, cells_found;
   for (size_t k = 0; k < expected->idx.size(); ++k) {
-    const auto pixel = ImageFromCamera(query.camera, cam_from_world * expected->landmarks[k].position);
-    if (!pixel || !IsInImage(*pixel, query.camera)) continue;
+    const MapLandmark& landmark = expected->landmarks[k];
+    const Eigen::Vector3d point = cam_from_world * landmark.position;
+    const auto pixel = ImageFromCamera(query.camera, point);
+    if (!pixel || !IsInImage(*pixel, query.camera) ||
+        !WasLookedFor(landmark, DepthOfScale(query.camera, point), query))
+      continue;
     evidence.num_expected += seen.at(expected->idx[k]) / sum;
     const int cell = CellOf(*pixel, query.camera, num_cells);
     cells_expected.insert(cell);

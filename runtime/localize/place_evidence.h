@@ -13,9 +13,9 @@ namespace cairn {
 // What an image should show where a pose puts it, and what of that it does show.  Doors, lamps and signs of
 // another floor agree on a pose as well as those of the right one; but what is between them is missing.
 struct PlaceEvidence {
-  // Landmarks in view, each times the share of the nearest survey images that see it: near ones count most,
-  // so that what stands behind a wall, is seen from another side only or is much smaller from here counts
-  // little.
+  // Landmarks in view that were looked for (WasLookedFor), each times the share of the nearest survey images
+  // that see it: near ones count most, so that what stands behind a wall, is seen from another side only or
+  // is much smaller from here counts little.
   double num_expected = 0;
   int num_matched = 0;  // matches, found without the pose, that agree with it
   // Square of the distance to the nearest survey image, in views (a tenth of the depth, 15 degrees): far from

@@ -192,6 +192,12 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
   };
 }
 
+std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
+  std::vector<int32_t> images;
+  for (const Candidate& candidate : candidates) images.push_back(candidate.image);
+  return images;
+}
+
 Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
                                                const RetrieveOptions& options) {
   return map.has_words() ? RetrieveByVocabulary(map, query.features.descriptors, options)

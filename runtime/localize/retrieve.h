@@ -14,6 +14,7 @@ struct Candidate {
   int32_t image = 0;  // index of the image in the map
   double score = 0;
 };
+std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates);
 
 // All of these: errors as Map::Landmarks, a damaged block.
 

@@ -9,6 +9,7 @@
 #include <pybind11/stl.h>
 
 #include "runtime/c_api/named_options.h"
+#include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
@@ -52,10 +53,9 @@ class PyTracker {
     const py::gil_scoped_release release;
     const auto used = one_thread_.Use();
     const Camera chosen = CameraFor(*map_, grey, camera);
-    if (!log_) return ValueOrThrow(tracker_->Track(grey, chosen));
-    const Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
-    Localization found = ValueOrThrow(tracker_->TrackFeatures(query.features, chosen));
-    log_->Offer(query, found);
+    QueryFrame frame(*localizer_, grey, chosen);
+    Localization found = ValueOrThrow(tracker_->TrackFrame(&frame));
+    if (log_) log_->Offer(&frame, found);
     return found;
   }
 

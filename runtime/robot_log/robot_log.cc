@@ -98,6 +98,7 @@ class RobotLog::Writer {
   Writer(std::string folder, const RobotLogOptions& options, FileLock lock)
       : folder_(std::move(folder)), options_(options), lock_(std::move(lock)) {}
   Status Load(const MapHead& map, const MachineClocks& now);
+  bool IsWanted(const Pose& cam_from_world, const MachineClocks& now);
   Result<bool> Offer(const LoggedFrame& frame, const MachineClocks& now);
   double MaxBytesPerDay() const { return 1e6 * options_.max_mb_per_day; }
   int num_kept() const { return num_kept_; }
@@ -132,6 +133,10 @@ RobotLog& RobotLog::operator=(RobotLog&& other) noexcept = default;
 RobotLog::~RobotLog() = default;
 
 int RobotLog::num_kept() const { return writer_->num_kept(); }
+
+bool RobotLog::IsWanted(const Pose& cam_from_world, const MachineClocks& now) {
+  return writer_->IsWanted(cam_from_world, now);
+}
 
 Result<bool> RobotLog::Offer(const LoggedFrame& frame, const MachineClocks& now) {
   return writer_->Offer(frame, now);
@@ -209,9 +214,13 @@ bool RobotLog::Writer::IsElsewhere(const Pose& cam_from_world) const {
   });
 }
 
-Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineClocks& now) {
+bool RobotLog::Writer::IsWanted(const Pose& cam_from_world, const MachineClocks& now) {
   budget_.Advance(MaxBytesPerDay(), now);
-  if (frame.features->keypoints.empty() || !IsElsewhere(frame.cam_from_world)) return false;
+  return IsElsewhere(cam_from_world);
+}
+
+Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineClocks& now) {
+  if (!IsWanted(frame.cam_from_world, now) || frame.features->keypoints.empty()) return false;
   std::error_code error;
   double num_bytes = kBytesBesides + static_cast<double>(frame.features->keypoints.size() *
                                                          (sizeof(Keypoint) + kDescriptorDim));

@@ -6,6 +6,7 @@
 
 #include "core/base/no_throw.h"
 #include "core/capture/capture_frame.h"
+#include "runtime/localize/localizer.h"
 #include "runtime/robot_log/robot_log.h"
 
 namespace cairn {
@@ -62,6 +63,19 @@ void SharedLog::Offer(const Query& query, const Localization& found) {
   if (kept.ok()) return;
   state_->error = kept.error();
   state_->log.reset();
+}
+
+void SharedLog::Offer(QueryFrame* frame, const Localization& found) {
+  const auto query = WithoutExceptions("log a frame", [&]() -> Result<const Query*> {
+    return IsWanted(found) ? frame->WithAllFeatures() : Result<const Query*>(nullptr);
+  });
+  if (query.ok() && *query != nullptr) Offer(**query, found);
+}
+
+bool SharedLog::IsWanted(const Localization& found) {
+  if (!found.has_fix()) return false;
+  const std::lock_guard lock(state_->mutex);
+  return state_->log && state_->log->IsWanted(found.cam_from_world, ReadMachineClocks());
 }
 
 Status SharedLog::error() const {

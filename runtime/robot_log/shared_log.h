@@ -10,6 +10,8 @@
 
 namespace cairn {
 
+class QueryFrame;  // runtime/localize/localizer.h
+
 // A log of a map's frames for several localizers and trackers, in any threads.  A log that can no longer be
 // written keeps nothing more, and keeps no robot from knowing where it is: the answers go on, and error()
 // says why.  Frames have no file: they are called as if they came from .pgm files.
@@ -29,6 +31,8 @@ class SharedLog {
 
   // A frame that was localized; without a fix, or after Close, nothing happens.
   void Offer(const Query& query, const Localization& found);
+  // Its features are extracted only where it may be kept.
+  void Offer(QueryFrame* frame, const Localization& found);
 
   // What keeps it from being written.
   Status error() const;
@@ -39,6 +43,7 @@ class SharedLog {
  private:
   struct State;
   explicit SharedLog(std::unique_ptr<State> state);
+  bool IsWanted(const Localization& found);
 
   std::unique_ptr<State> state_;
 };

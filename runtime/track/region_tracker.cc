@@ -11,6 +11,7 @@
 #include "runtime/localize/refine.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
+#include "runtime/track/expected_features.h"
 
 namespace cairn {
 OptionTable DescribeOptions(RegionTrackerOptions* o) {
@@ -43,26 +44,62 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .value = &o->max_num_neighbour_regions,
        .help = "most regions besides its own whose landmarks are looked for",
        .min = 0},
+      {.name = "map_guided",
+       .value = &o->features.map_guided,
+       .help = "look for features of the scales and in the places that the map expects, while the camera is "
+               "followed; false: for all features of each image"},
+      {.name = "max_num_fine_features",
+       .value = &o->features.max_num_fine_features,
+       .help = "most features of fine scales that make a fix by coarse ones more exact; 0: none",
+       .min = 0},
+      {.name = "fine_radius_px",
+       .value = &o->features.fine_radius_px,
+       .help = "how near to where a landmark is expected they are looked for, px",
+       .min = 0.1},
   };
+  AddCondition({"map_guided", {"true"}}, {"max_num_fine_features", "fine_radius_px"}, &table);
   for (Option& option : DescribeOptions(&o->wheels)) table.push_back(std::move(option));
   return table;
 }
 
+namespace {
+
+// A first pose of few matches is not far off where it agrees with the prediction, or else is not taken; and
+// as many samples are drawn as their matches ask for.
+LocalizerOptions ExpectingOptions(LocalizerOptions options) {
+  options.match.guided_widest = 1;
+  options.estimate.min_num_ransac_iterations = std::min(options.estimate.min_num_ransac_iterations, 16);
+  return options;
+}
+
+}  // namespace
+
 RegionTracker::RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
                              const RegionTrackerOptions& options)
-    : map_(map), localizer_(std::move(map), localizer_options), options_(options) {}
+    : map_(map),
+      localizer_(map, localizer_options),
+      expecting_localizer_(std::move(map), ExpectingOptions(localizer_options)),
+      options_(options) {}
 
 Result<Localization> RegionTracker::Track(const cv::Mat& grey, const Camera& camera) {
-  return WithoutExceptions("track", [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromImage(grey, camera));
-    return TrackQuery(query);
-  });
+  QueryFrame frame(localizer_, grey, camera);
+  return TrackFrame(&frame);
 }
 
 Result<Localization> RegionTracker::TrackFeatures(Features features, const Camera& camera) {
+  QueryFrame frame(localizer_, std::move(features), camera);
+  return TrackFrame(&frame);
+}
+
+Result<Localization> RegionTracker::TrackFrame(QueryFrame* frame) {
   return WithoutExceptions("track", [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromFeatures(std::move(features), camera));
-    return TrackQuery(query);
+    const std::optional<PosePrior> prior = Prediction();
+    if (prior && frame->image() != nullptr && options_.features.map_guided) {
+      CAIRN_ASSIGN_OR_RETURN(const auto found, TrackExpected(*frame->image(), frame->camera(), *prior));
+      if (found) return *found;
+    }
+    CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
+    return TrackQuery(*query, prior);
   });
 }
 
@@ -113,10 +150,20 @@ std::optional<UncertainPose> RegionTracker::Believed() const {
                        TransformCovariance(given_from_camera, believed.covariance)};
 }
 
-Result<Localization> RegionTracker::TrackQuery(const Query& query) {
+Result<std::optional<Localization>> RegionTracker::TrackExpected(const cv::Mat& grey, const Camera& camera,
+                                                                 const PosePrior& prior) {
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+  CAIRN_ASSIGN_OR_RETURN(const auto expected, ExpectedLandmarks(prior, AsFound(map_->head(), camera)));
+  CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeExpected(*map_, expecting_localizer_, grey, camera,
+                                                              expected, prior, options_.features));
+  if (!found.has_fix() || !Agrees(found, prior)) return std::optional<Localization>();
+  Update(found);
+  return std::optional(std::move(found));
+}
+
+Result<Localization> RegionTracker::TrackQuery(const Query& query, const std::optional<PosePrior>& prior) {
   const bool has_features =
       static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
-  const std::optional<PosePrior> prior = Prediction();
   // [Sala06 §III] inside a region its features are tracked; here those of its neighbours too
   if (has_features && prior) {
     CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
@@ -165,9 +212,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (region_ >= 0) regions.push_back(region_);
   CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions));
   if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
-    std::vector<int32_t> images;
-    for (const Candidate& candidate : near) images.push_back(candidate.image);
-    CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, images));
+    CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near)));
     landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
     std::sort(landmarks.begin(), landmarks.end());
     landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());

@@ -10,6 +10,17 @@
 
 namespace cairn {
 
+// Which features of an image are looked for where its landmarks are expected (expected_features.h).
+struct ExpectedFeaturesOptions {
+  // Whether at all; otherwise all features of each image are.
+  bool map_guided = true;
+  // Coarse features (SiftScales) give a fix, and at most so many fine ones, the strongest near the landmarks
+  // that it puts into the image, make it more exact.  0: none do.  REQUIRES: >= 0
+  int max_num_fine_features = 300;
+  // How near, px, besides three standard deviations of the landmark's own place.  REQUIRES: > 0
+  double fine_radius_px = 3;
+};
+
 // How a stream of frames is followed, beyond the localizer's own options.
 struct RegionTrackerOptions {
   // Standard deviation of the change of motion from one frame to the next, m and degrees; every frame without
@@ -27,15 +38,17 @@ struct RegionTrackerOptions {
   // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
   // REQUIRES: >= 0
   int max_num_neighbour_regions = 6;
+  ExpectedFeaturesOptions features;
   // When it is lost.
   VoteOptions votes;
 };
-// Without those of the vote, which have a table of their own; with those of odometry.
+// Without those of the vote, which have a table of their own; with those of odometry and of features.
 OptionTable DescribeOptions(RegionTrackerOptions* options);
 
 // Finds where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
 // landmarks of its region and of the regions around that the motion so far (odometry, or a constant velocity,
-// less certain with every frame) predicts to be in view; a fix far from the prediction does not count.  When
+// less certain with every frame) predicts to be in view, in an image by features of their scales alone
+// (expected_features.h); a fix far from the prediction does not count.  When
 // that fails, all visible landmarks vote for the regions that they belong to (region_votes.h), and those of
 // the regions with the most votes are matched; where these give no sure fix, the frame is localized as if it
 // were the first. The latter two do not use earlier frames: a kidnapped robot is found again.  A region of
@@ -58,6 +71,8 @@ class RegionTracker {
   // Errors: as Localizer::Localize; the state is then as before.  No exception leaves it.
   Result<Localization> Track(const cv::Mat& grey, const Camera& camera);
   Result<Localization> TrackFeatures(Features features, const Camera& camera);
+  // The same of a frame of which others use the features, too.
+  Result<Localization> TrackFrame(QueryFrame* frame);
 
   // Where the next frame is expected; none when lost.
   std::optional<PosePrior> Prediction() const;
@@ -66,7 +81,10 @@ class RegionTracker {
   std::optional<UncertainPose> Believed() const;
 
  private:
-  Result<Localization> TrackQuery(const Query& query);
+  Result<Localization> TrackQuery(const Query& query, const std::optional<PosePrior>& prior);
+  // Found by the prediction, without the features of all of the image; nothing if not.
+  Result<std::optional<Localization>> TrackExpected(const cv::Mat& grey, const Camera& camera,
+                                                    const PosePrior& prior);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
   Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
   // The visible landmarks vote for their regions.
@@ -79,6 +97,7 @@ class RegionTracker {
 
   std::shared_ptr<const Map> map_;
   Localizer localizer_;
+  Localizer expecting_localizer_;  // where a prediction is at hand
   RegionTrackerOptions options_;
   Pose last_, step_;  // of the last fix; from each frame's camera to the next one's
   RegionIdx region_ = -1;

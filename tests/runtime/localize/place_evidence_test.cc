@@ -76,6 +76,20 @@ TEST_F(EvidenceOfPlaceTest, OnlyTheNearestImagesCount) {
   EXPECT_EQ(before.num_expected, 4);
 }
 
+TEST_F(EvidenceOfPlaceTest, WhatWasNotLookedForIsNotExpected) {
+  // Sizes of 1, 2, 4 and 8 px at 4 m; of the last one it is not known.
+  for (const LandmarkIdx landmark : {0, 1, 2, 3, 4})
+    rows_.landmarks[landmark].scale_m = 0.04 * (1 << landmark);
+  rows_.landmarks[3].scale_m = 0;
+  query_.min_scale_px = 2;
+  const PlaceEvidence evidence = Evidence({0, 1, 2});
+  EXPECT_DOUBLE_EQ(evidence.num_expected, 2);  // 1 and 2
+  EXPECT_EQ(evidence.num_cells_expected, 2);
+  EXPECT_EQ(evidence.num_cells_found, 2);
+  query_.min_scale_px = 2.001;
+  EXPECT_DOUBLE_EQ(Evidence({0, 1, 2}).num_expected, 1);
+}
+
 TEST_F(EvidenceOfPlaceTest, WithoutAnythingFoundNothingIsKnown) {
   const PlaceEvidence evidence = Evidence({});
   EXPECT_EQ(evidence.num_expected, 0);

@@ -8,7 +8,9 @@
 
 #include "core/base/random.h"
 #include "core/blocks/map_rows.h"
+#include "core/camera/pixel_ray.h"
 #include "core/features/sift.h"
+#include "runtime/localize/localizer_options.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
@@ -83,8 +85,11 @@ inline MapRows MakePosterMap(const PosterScene& scene) {
       const Eigen::Vector3d direction = image.cam_from_world.rotation.conjugate() * ray->homogeneous();
       const Eigen::Vector3d center = image.cam_from_world.Center();
       image.landmarks.push_back(static_cast<LandmarkIdx>(rows.landmarks.size()));
-      rows.landmarks.push_back({.position = center + direction * ((3 - center.x()) / direction.x()),
+      const Eigen::Vector3d position = center + direction * ((3 - center.x()) / direction.x());
+      const double depth = DepthOfScale(scene.camera, image.cam_from_world * position);
+      rows.landmarks.push_back({.position = position,
                                 .covariance = 1e-6 * Eigen::Matrix3d::Identity(),
+                                .scale_m = features.keypoints[k].scale * depth / scene.camera.MeanFocal(),
                                 .num_observations = 1});
       descriptors.push_back(features.descriptors.row(static_cast<Eigen::Index>(k)));
     }
@@ -96,6 +101,13 @@ inline MapRows MakePosterMap(const PosterScene& scene) {
   NoProgress progress;
   rows.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, 0, 1, progress);
   return rows;
+}
+
+// What finds a camera before the poster: a place on the wall is up to three landmarks, one per view.
+inline LocalizerOptions PosterOptions() {
+  LocalizerOptions options;
+  options.match.max_ratio = 0.95;
+  return options;
 }
 
 // Between the views, so that most of a feature's copies in the map are one place seen from two sides.

@@ -11,12 +11,6 @@
 namespace cairn {
 namespace {
 
-LocalizerOptions PosterOptions() {
-  LocalizerOptions options;
-  options.match.max_ratio = 0.95;  // a place on the wall is up to three landmarks, one per view
-  return options;
-}
-
 TEST(Poster, PixelsAreLocalizedToCentimetres) {
   const PosterScene scene = MakePosterScene(1);
   const auto map = *Map::FromRows(MakePosterMap(scene));

@@ -97,6 +97,18 @@ class RobotLogTest : public testing::Test {
   MapHead map_;
 };
 
+TEST_F(RobotLogTest, SaysWhetherAFrameIsWantedBeforeItsFeaturesAreKnown) {
+  auto log = Open();
+  Pose here, elsewhere;
+  elsewhere.translation.x() = -2;
+  EXPECT_TRUE(log->IsWanted(here, At(1, 1)));
+  EXPECT_TRUE(Offer(0, 1, &*log));
+  EXPECT_FALSE(log->IsWanted(here, At(2, 2)));
+  EXPECT_TRUE(log->IsWanted(elsewhere, At(2, 2)));
+  EXPECT_TRUE(Offer(2, 2, &*log));
+  EXPECT_FALSE(log->IsWanted(elsewhere, At(3, 3)));
+}
+
 TEST_F(RobotLogTest, IsACaptureOfFeaturesThatLaterRunsAddTo) {
   {
     auto log = Open();
