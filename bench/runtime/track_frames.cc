@@ -61,7 +61,7 @@ struct Figures {
   void Print(const std::string& name) const {
     const auto num_frames = static_cast<double>(ms.size());
     fmt::print(
-        "| {} | {:.1f} | {:.3f} | {} of {} | {} | {:.2f} cm, {:.3f}° | {:.2f} cm, {:.3f}° | {:.1f} | {:.0f}, "
+        "| {} | {:.1f} | {:.3f} | {} of {} | {} | {:.3f} cm, {:.3f}° | {:.3f} cm, {:.3f}° | {:.1f} | {:.0f}, "
         "{:.0f} |",
         name, QuantileOf(ms, 0.5), QuantileOf(ms_of_opencv, 0.5), num_fixes, ms.size(), num_wrong,
         100 * QuantileOf(errors_m, 0.5), QuantileOf(errors_deg, 0.5), 100 * QuantileOf(errors_m, 0.9),
