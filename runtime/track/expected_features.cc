@@ -18,53 +18,34 @@ constexpr double kSmallerRatio = 1.5;
 // Largest ratio of a feature's scale to the expected one, or of its inverse.
 constexpr double kMaxScaleRatio = 1.6;
 
+// How far a landmark may appear from where it is expected because its own place is not well known, radii.
+constexpr double kMaxRadii = 4;
+
 // A landmark where a pose puts it in the image.
-struct Sight {
+struct ExpectedSight {
   Eigen::Vector2d pixel;
   double radius_px = 0;
   double scale_px = 0;
 };
 
-// Sights in square cells, for those near a keypoint.
-class Sights {
- public:
-  Sights(const Camera& camera, double cell_px)
-      : cell_px_(cell_px),
-        num_columns_(static_cast<int>(camera.width / cell_px) + 1),
-        num_rows_(static_cast<int>(camera.height / cell_px) + 1),
-        cells_(static_cast<size_t>(num_columns_) * num_rows_) {}
+bool IsLike(const Keypoint& keypoint, const ExpectedSight& sight) {
+  const double dx = keypoint.x - sight.pixel.x(), dy = keypoint.y - sight.pixel.y();
+  const double scale_ratio = keypoint.scale / sight.scale_px;
+  return dx * dx + dy * dy <= sight.radius_px * sight.radius_px && scale_ratio <= kMaxScaleRatio &&
+         scale_ratio >= 1 / kMaxScaleRatio;
+}
 
-  // In each cell that the circle around it touches.
-  void Add(const Sight& sight) {
-    const auto cell = [&](double at, int count) {
-      return std::clamp(static_cast<int>(std::floor(at / cell_px_)), 0, count - 1);
-    };
-    for (int row = cell(sight.pixel.y() - sight.radius_px, num_rows_);
-         row <= cell(sight.pixel.y() + sight.radius_px, num_rows_); ++row) {
-      for (int column = cell(sight.pixel.x() - sight.radius_px, num_columns_);
-           column <= cell(sight.pixel.x() + sight.radius_px, num_columns_); ++column)
-        cells_[static_cast<size_t>(row) * num_columns_ + column].push_back(sight);
-    }
+// Whether a keypoint is like one of these sights, which are ordered by column and whose radii are at most
+// this.
+bool IsLikeAny(const Keypoint& keypoint, const std::vector<ExpectedSight>& sights, double max_radius_px) {
+  const auto first = std::partition_point(sights.begin(), sights.end(), [&](const ExpectedSight& sight) {
+    return sight.pixel.x() < keypoint.x - max_radius_px;
+  });
+  for (auto sight = first; sight != sights.end() && sight->pixel.x() <= keypoint.x + max_radius_px; ++sight) {
+    if (IsLike(keypoint, *sight)) return true;
   }
-
-  bool HasLike(const Keypoint& keypoint) const {
-    const int row = std::clamp(static_cast<int>(keypoint.y / cell_px_), 0, num_rows_ - 1);
-    const int column = std::clamp(static_cast<int>(keypoint.x / cell_px_), 0, num_columns_ - 1);
-    const auto& cell = cells_[static_cast<size_t>(row) * num_columns_ + column];
-    return std::any_of(cell.begin(), cell.end(), [&](const Sight& sight) {
-      const double dx = keypoint.x - sight.pixel.x(), dy = keypoint.y - sight.pixel.y();
-      return dx * dx + dy * dy <= sight.radius_px * sight.radius_px &&
-             keypoint.scale <= kMaxScaleRatio * sight.scale_px &&
-             sight.scale_px <= kMaxScaleRatio * keypoint.scale;
-    });
-  }
-
- private:
-  double cell_px_;
-  int num_columns_;
-  int num_rows_;
-  std::vector<std::vector<Sight>> cells_;
-};
+  return false;
+}
 
 // Those that coarse features show.
 std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_from_world,
@@ -79,23 +60,24 @@ std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_
   return coarse;
 }
 
-// Where the pose puts those that fine features show.
-Sights FineSights(const LandmarkSet& landmarks, const Pose& cam_from_world, const Query& coarse,
-                  double radius_px) {
+// Where the pose puts those that fine features show, ordered by column.
+std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Pose& cam_from_world,
+                                      const Query& coarse, double radius_px) {
   constexpr double kNumSigmas = 3;
-  Sights sights(coarse.camera, std::max(16.0, 2 * radius_px));
+  std::vector<ExpectedSight> sights;
   const double focal_px = coarse.camera.MeanFocal();
-  const double max_radius_px = std::hypot(coarse.camera.width, coarse.camera.height);
   for (const MapLandmark& landmark : landmarks.landmarks) {
     const Eigen::Vector3d point = cam_from_world * landmark.position;
     const auto pixel = ImageFromCamera(coarse.camera, point);
-    const double depth = DepthOfScale(coarse.camera, point);
-    if (!pixel || !IsInImage(*pixel, coarse.camera) || landmark.scale_m <= 0 || depth <= 0) continue;
-    const double scale_px = landmark.scale_m * focal_px / depth;
+    if (!pixel || !IsInImage(*pixel, coarse.camera) || landmark.scale_m <= 0) continue;
+    const double pixels_per_m = focal_px / DepthOfScale(coarse.camera, point);
+    const double scale_px = landmark.scale_m * pixels_per_m;
     if (scale_px > kMaxScaleRatio * coarse.min_scale_px) continue;
-    const double own_px = kNumSigmas * focal_px / depth * std::sqrt(landmark.covariance.trace() / 3);
-    sights.Add({*pixel, std::min(std::hypot(radius_px, own_px), max_radius_px), scale_px});
+    const double own_px = kNumSigmas * pixels_per_m * std::sqrt(landmark.covariance.trace() / 3);
+    sights.push_back({*pixel, std::min(std::hypot(radius_px, own_px), kMaxRadii * radius_px), scale_px});
   }
+  std::sort(sights.begin(), sights.end(),
+            [](const ExpectedSight& a, const ExpectedSight& b) { return a.pixel.x() < b.pixel.x(); });
   return sights;
 }
 
@@ -124,10 +106,13 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
       localizer.LocalizeAmong(query, Scope::kTrack,
                               CoarseOf(*landmarks, camera_from_given * prior.cam_from_world, query), prior));
   if (!found.has_fix() || options.max_num_fine_features == 0) return found;
-  const Sights sights =
+  const std::vector<ExpectedSight> sights =
       FineSights(*landmarks, camera_from_given * found.cam_from_world, query, options.fine_radius_px);
   CAIRN_RETURN_IF_ERROR(localizer.AddFineFeatures(
-      grey, options.max_num_fine_features, [&](const Keypoint& keypoint) { return sights.HasLike(keypoint); },
+      grey, options.max_num_fine_features,
+      [&](const Keypoint& keypoint) {
+        return IsLikeAny(keypoint, sights, kMaxRadii * options.fine_radius_px);
+      },
       &query));
   return localizer.Sharpen(query, *landmarks, std::move(found));
 }

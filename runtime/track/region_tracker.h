@@ -17,7 +17,8 @@ struct ExpectedFeaturesOptions {
   // Coarse features (SiftScales) give a fix, and at most so many fine ones, the strongest near the landmarks
   // that it puts into the image, make it more exact.  0: none do.  REQUIRES: >= 0
   int max_num_fine_features = 300;
-  // How near, px, besides three standard deviations of the landmark's own place.  REQUIRES: > 0
+  // How near, px, besides three standard deviations of the landmark's own place, in all at most four times so
+  // far.  REQUIRES: > 0
   double fine_radius_px = 3;
 };
 

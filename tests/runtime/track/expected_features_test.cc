@@ -1,12 +1,16 @@
 // Features that are looked for where landmarks are expected, on pixels.
 #include "runtime/track/expected_features.h"
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/camera/pixel_ray.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/poster_scene.h"
 
 namespace cairn {
@@ -92,15 +96,61 @@ TEST(LocalizeExpected, FineFeaturesMakeErrorsSmaller) {
   EXPECT_LT(fine_error_m, coarse_error_m);
 }
 
-TEST(LocalizeExpected, LooksNoFartherThanTheRadius) {
+// How many of the image's fine features are as near to a landmark, and of such a scale, as one is looked for
+// at this pose.
+int NumFineFeaturesNear(const Map& map, const cv::Mat& grey, const Pose& cam_from_world, double radius_px) {
+  const Camera& camera = Poster().camera;
+  const Features fine = *ExtractUndoubledSift(grey, {}, SiftScales::kFine);
+  const auto landmarks = *map.AllLandmarks();
+  return static_cast<int>(
+      std::count_if(fine.keypoints.begin(), fine.keypoints.end(), [&](const Keypoint& keypoint) {
+        return std::any_of(
+            landmarks->landmarks.begin(), landmarks->landmarks.end(), [&](const MapLandmark& landmark) {
+              const Eigen::Vector3d point = cam_from_world * landmark.position;
+              const auto pixel = ImageFromCamera(camera, point);
+              if (!pixel || !IsInImage(*pixel, camera)) return false;
+              const double pixels_per_m = camera.MeanFocal() / DepthOfScale(camera, point);
+              const double scale_px = landmark.scale_m * pixels_per_m;
+              const double sigma_px = std::sqrt(landmark.covariance.trace() / 3) * pixels_per_m;
+              const double reach_px = std::min(4 * radius_px, std::hypot(radius_px, 3 * sigma_px));
+              return (*pixel - Eigen::Vector2d(keypoint.x, keypoint.y)).norm() <= reach_px &&
+                     scale_px <= 1.6 * CoarseSiftScalePx(grey.size(), {}) &&
+                     keypoint.scale <= 1.6 * scale_px && scale_px <= 1.6 * keypoint.scale;
+            });
+      }));
+}
+
+TEST(LocalizeExpected, LooksForFineFeaturesNearLandmarksOfTheirScaleAlone) {
   const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
-  int before = 0;
-  for (const double radius_px : {1.0, 4.0, 40.0}) {
+  const auto coarse = FindExpected(grey, Poster().camera, {.max_num_fine_features = 0});
+  for (const double radius_px : {1.0, 3.0, 10.0}) {
     const auto found =
         FindExpected(grey, Poster().camera, {.max_num_fine_features = 100000, .fine_radius_px = radius_px});
-    EXPECT_GT(found->num_features, before) << radius_px;
-    before = found->num_features;
+    EXPECT_EQ(found->num_features - coarse->num_features,
+              NumFineFeaturesNear(*PosterMap(), grey, coarse->cam_from_world, radius_px))
+        << radius_px;
   }
+}
+
+TEST(LocalizeExpected, LandmarksOfUncertainPlaceAreLookedForFartherAway) {
+  MapRows rows = MakePosterMap(Poster());
+  for (size_t i = 0; i < rows.landmarks.size(); ++i) {
+    const double sigma_m = i % 3 == 0 ? 0.001 : i % 3 == 1 ? 0.02 : 2;  // 0.1, 2 and 190 px
+    rows.landmarks[i].covariance = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+  }
+  const auto map = *Map::FromRows(rows);
+  const Localizer localizer(map, PosterOptions());
+  const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
+  PosePrior prior;
+  prior.cam_from_world = PosterQueryPose();
+  const auto coarse = *LocalizeExpected(*map, localizer, grey, Poster().camera, AllOf(*map), prior,
+                                        {.max_num_fine_features = 0}),
+             fine = *LocalizeExpected(*map, localizer, grey, Poster().camera, AllOf(*map), prior,
+                                      {.max_num_fine_features = 100000});
+  ASSERT_TRUE(coarse.has_fix()) << coarse.message;
+  const int num_near = NumFineFeaturesNear(*map, grey, coarse.cam_from_world, 3);
+  EXPECT_EQ(fine.num_features - coarse.num_features, num_near);
+  EXPECT_GT(num_near, NumFineFeaturesNear(*PosterMap(), grey, coarse.cam_from_world, 3) + 10);
 }
 
 TEST(LocalizeExpected, WhatIsNotThereIsNotFound) {
