@@ -106,7 +106,7 @@ struct MapLocalizer::State {
     return camera;
   }
 
-  // By the features that a log and a belief need, too.
+  // With what a log and a belief need of the image.
   Result<Localization> LocateByFeatures(const cv::Mat& grey, const Camera& camera, double stamp_s,
                                         std::optional<Places>* places) {
     QueryFrame frame(localizer, grey, camera);

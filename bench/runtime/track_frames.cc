@@ -73,7 +73,7 @@ struct Figures {
 };
 
 Status Run(const std::string& map_path, const std::string& capture_path, bool queries, int kidnap_every,
-           int max_num_frames) {
+           int max_num_frames, int max_num_fine) {
   cv::setNumThreads(1);
   // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
@@ -96,9 +96,10 @@ Status Run(const std::string& map_path, const std::string& capture_path, bool qu
   }
   if (static_cast<int>(frames.size()) > max_num_frames) frames.resize(max_num_frames);
   Localizer localizer(map);
-  RegionTrackerOptions whole_images;
+  RegionTrackerOptions whole_images, map_guided;
+  map_guided.features.max_num_fine_features = max_num_fine;
   whole_images.features.map_guided = false;
-  RegionTracker tracker(map, {}, whole_images), guided_tracker(map);
+  RegionTracker tracker(map, {}, whole_images), guided_tracker(map, {}, map_guided);
   const cv::Ptr<cv::SIFT> opencv =
       cv::SIFT::create(SiftOptions().max_num_features, 3, SiftOptions().contrast_threshold,
                        SiftOptions().edge_threshold, 1.6, CV_32F);
@@ -146,15 +147,18 @@ Status Run(const std::string& map_path, const std::string& capture_path, bool qu
 int main(int argc, char** argv) {
   std::string map, capture;
   bool queries = false;
+  int max_num_fine = cairn::RegionTrackerOptions().features.max_num_fine_features;
   int kidnap_every = 0, max_num_frames = std::numeric_limits<int>::max();
   CLI::App app("A drive localized frame by frame, and tracked");
   app.add_option("map", map, "map")->required();
   app.add_option("capture", capture, "capture of the drive, with poses")->required();
   app.add_flag("--queries", queries, "show the capture's queries, not its images");
   app.add_option("--kidnap-every", kidnap_every, "frames between kidnappings; 0: none");
+  app.add_option("--max-num-fine-features", max_num_fine, "of map-guided tracking");
   app.add_option("--frames", max_num_frames, "most frames");
   CLI11_PARSE(app, argc, argv);
-  if (const cairn::Status status = cairn::Run(map, capture, queries, kidnap_every, max_num_frames);
+  if (const cairn::Status status =
+          cairn::Run(map, capture, queries, kidnap_every, max_num_frames, max_num_fine);
       !status.ok()) {
     fmt::print(stderr, "{}\n", status.error().message);
     return 1;

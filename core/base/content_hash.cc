@@ -1,8 +1,8 @@
 #include "core/base/content_hash.h"
 
-// The state of a hash in parts has a size only here.
-#define XXH_STATIC_LINKING_ONLY
 #include <xxhash.h>
+
+#include <new>
 
 namespace cairn {
 
@@ -11,18 +11,15 @@ ContentHash HashContents(std::string_view bytes) {
   return {hash.high64, hash.low64};
 }
 
-struct PartsHasher::State {
-  XXH3_state_t xxh3;
-};
+PartsHasher::PartsHasher() : state_(XXH3_createState(), [](XXH3_state_s* state) { XXH3_freeState(state); }) {
+  if (!state_) throw std::bad_alloc();
+  XXH3_128bits_reset(state_.get());
+}
 
-PartsHasher::PartsHasher() : state_(std::make_unique<State>()) { XXH3_128bits_reset(&state_->xxh3); }
-
-PartsHasher::~PartsHasher() = default;
-
-void PartsHasher::Add(std::string_view part) { XXH3_128bits_update(&state_->xxh3, part.data(), part.size()); }
+void PartsHasher::Add(std::string_view part) { XXH3_128bits_update(state_.get(), part.data(), part.size()); }
 
 ContentHash PartsHasher::Finish() const {
-  const XXH128_hash_t hash = XXH3_128bits_digest(&state_->xxh3);
+  const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
   return {hash.high64, hash.low64};
 }
 

@@ -8,6 +8,8 @@
 
 #include "core/base/blob.h"
 
+struct XXH3_state_s;  // xxhash.h
+
 namespace cairn {
 
 // XXH3, 128 bits.  Not cryptographic.
@@ -22,13 +24,11 @@ ContentHash HashContents(std::string_view bytes);
 class PartsHasher {
  public:
   PartsHasher();
-  ~PartsHasher();
   void Add(std::string_view part);
   ContentHash Finish() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<XXH3_state_s, void (*)(XXH3_state_s*)> state_;
 };
 
 // A hash as 16 bytes of a blob.

@@ -3,8 +3,9 @@
 // SIFT [Lowe04]: keypoints and RootSIFT descriptors of an image or of a part of it.
 //
 // The keypoints are OpenCV 4.6's (features2d, SIFT) within the rounding of its float arithmetic: the image is
-// doubled, octaves have 3 layers, level 0 has a sigma of 1.6 px, 5 pixels of each octave's border have no
-// keypoints.  Unlike OpenCV's, the result has the same bits on every processor: see sift_kernels.h.
+// doubled (unless SiftSearch says otherwise), octaves have 3 layers, level 0 has a sigma of 1.6 px, 5 pixels
+// of each octave's border have no keypoints.  Unlike OpenCV's, the result has the same bits on every
+// processor: see sift_kernels.h.
 
 #include <array>
 #include <functional>
@@ -27,13 +28,13 @@ struct SiftSearch {
   // image's own, in half of the time.  Of its keypoints six in ten are then the same within half a pixel, of
   // the later octaves' more than four in five; as many show a map's landmarks (bench/runtime).
   bool doubled = true;
-  // Octaves that are searched, [first, end): of features with a sigma from 0.8 2^octave px to twice that.
+  // Octaves that are searched, [first, end): of features with a sigma from 0.9 2^octave px to twice that.
   int first_octave = 0;
   int end_octave = std::numeric_limits<int>::max();
   // Pixels of the image whose features are wanted; empty: all.
   cv::Rect region;
   // If given: whether a feature at such a place is wanted; the others get no orientation and no descriptor,
-  // which take half of the time.  x, y and size as in SiftFeature.
+  // which take half of the time.  x, y and size as in SiftFeature.  REQUIRES: does not call FindSift
   std::function<bool(float x, float y, float size)> is_wanted;
 };
 
@@ -56,7 +57,8 @@ struct SiftFeature {
 // Features of a region are, bit for bit, those of the whole image whose position is in the region, of which
 // the strongest are kept.  Their support, which is all that is computed: 60 pixels of the octave around where
 // they are sought (8 pixels around the region), in its level 0, and 20 more pixels of each octave before; in
-// all at most 44 x 2^octave pixels of the image around the region.
+// all at most 44 x 2^octave pixels of the image around the region; 76 in octave 0 of an image that is not
+// doubled.
 //
 // Takes about 75 bytes of memory for each pixel computed; a thread keeps up to 64 MiB of them for its next
 // image.  Throws: bad_alloc.

@@ -15,7 +15,7 @@ inline constexpr double kSiftSigma = 1.6;  // of level 0, pixels of the octave [
 enum class OctaveSource { kDoubledImage, kImage, kOctaveBefore };
 
 // What of an octave is computed, in its own pixels.  Octave o finds features of sigma 2^o to 2^(o + 1) times
-// 0.8 px of the image.
+// 0.9 px of the image.
 struct OctavePlan {
   int octave = 0;
   OctaveSource source = OctaveSource::kDoubledImage;

@@ -203,9 +203,10 @@ void OfferToLog(Answer* answer, std::optional<RobotLog>* log) {
   const MachineClocks now = ReadMachineClocks();
   const Result<bool> kept = [&]() -> Result<bool> {
     if (!(*log)->IsWanted(cam_from_world, now)) return false;
-    CAIRN_ASSIGN_OR_RETURN(const Query* query, answer->frame->WithAllFeatures());
-    return (*log)->Offer({.features = &query->features,
-                          .camera = &query->camera,
+    const auto query = answer->frame->WithAllFeatures();
+    if (!query.ok()) return false;  // no fault of the log
+    return (*log)->Offer({.features = &(*query)->features,
+                          .camera = &(*query)->camera,
                           .cam_from_world = cam_from_world,
                           .image_path = answer->image},
                          now);

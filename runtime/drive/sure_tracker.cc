@@ -111,13 +111,17 @@ Status SureTracker::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_de
 }
 
 Result<Localization> SureTracker::Track(const cv::Mat& grey, const Camera& camera) {
-  QueryFrame frame(localizer_, grey, camera);
-  return TrackFrame(&frame);
+  return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
+    QueryFrame frame(localizer_, grey, camera);
+    return TrackFrame(&frame);
+  });
 }
 
 Result<Localization> SureTracker::TrackFeatures(Features features, const Camera& camera) {
-  QueryFrame frame(localizer_, std::move(features), camera);
-  return TrackFrame(&frame);
+  return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
+    QueryFrame frame(localizer_, std::move(features), camera);
+    return TrackFrame(&frame);
+  });
 }
 
 Result<Localization> SureTracker::TrackFrame(QueryFrame* frame) {

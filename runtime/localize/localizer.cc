@@ -143,8 +143,11 @@ Result<Query> Localizer::CoarseQueryFromImage(const cv::Mat& grey, const Camera&
 
 Status Localizer::AddFineFeatures(const cv::Mat& grey, int max_num,
                                   const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const {
+  CAIRN_RETURN_IF_ERROR(CheckImage(grey, query->camera));
   SiftOptions sift = options_.sift;
-  sift.max_num_features = std::min(sift.max_num_features, max_num);
+  sift.max_num_features =
+      std::min(sift.max_num_features - static_cast<int>(query->features.keypoints.size()), max_num);
+  if (sift.max_num_features < 1) return Ok();
   CAIRN_ASSIGN_OR_RETURN(const Features features,
                          ExtractUndoubledSift(grey, sift, SiftScales::kFine, is_wanted));
   AddFeatures(features, options_.measurement, query);
@@ -469,7 +472,7 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
 Result<const Query*> QueryFrame::WithAllFeatures() {
   if (!query_) {
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_)
-                                              : localizer_.QueryFromFeatures(std::move(features_), camera_));
+                                              : localizer_.QueryFromFeatures(features_, camera_));
     query_ = std::make_shared<const Query>(std::move(query));
   }
   return query_.get();

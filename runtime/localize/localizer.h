@@ -49,7 +49,8 @@ class Localizer {
   // In two steps, a third of the time: its coarse features (SiftScales), then of its fine ones those that are
   // wanted.
   Result<Query> CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera) const;
-  // At most so many, the strongest.
+  // At most so many, the strongest, and no more than SiftOptions::max_num_features with those that it has.
+  // Errors: as Localize.
   Status AddFineFeatures(const cv::Mat& grey, int max_num,
                          const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const;
   Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;

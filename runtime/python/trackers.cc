@@ -71,7 +71,7 @@ class PyTracker {
  private:
   std::shared_ptr<const Map> map_;
   std::shared_ptr<SharedLog> log_;
-  std::optional<Localizer> localizer_;  // for the features that are logged
+  std::optional<Localizer> localizer_;  // for the features of frames
   std::optional<SureTracker> tracker_;
   OneThread one_thread_{"tracker", "camera"};
 };

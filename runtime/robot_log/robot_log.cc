@@ -125,6 +125,7 @@ class RobotLog::Writer {
   std::string images_text_;  // of images.txt
   ImageId last_id_ = 0;
   int num_kept_ = 0;
+  double last_num_bytes_ = 0;  // of the frame that was kept last
 };
 
 RobotLog::RobotLog(std::unique_ptr<Writer> writer) : writer_(std::move(writer)) {}
@@ -216,11 +217,12 @@ bool RobotLog::Writer::IsElsewhere(const Pose& cam_from_world) const {
 
 bool RobotLog::Writer::IsWanted(const Pose& cam_from_world, const MachineClocks& now) {
   budget_.Advance(MaxBytesPerDay(), now);
-  return IsElsewhere(cam_from_world);
+  return budget_.bytes >= kBytesBesides + 0.5 * last_num_bytes_ && IsElsewhere(cam_from_world);
 }
 
 Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineClocks& now) {
-  if (!IsWanted(frame.cam_from_world, now) || frame.features->keypoints.empty()) return false;
+  budget_.Advance(MaxBytesPerDay(), now);
+  if (frame.features->keypoints.empty() || !IsElsewhere(frame.cam_from_world)) return false;
   std::error_code error;
   double num_bytes = kBytesBesides + static_cast<double>(frame.features->keypoints.size() *
                                                          (sizeof(Keypoint) + kDescriptorDim));
@@ -236,6 +238,7 @@ Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineCloc
       WithDatabaseErrors(folder_ + "/" + kFeaturesFile, [&] { return Keep(frame, name, num_bytes); }));
   CAIRN_RETURN_IF_ERROR(WriteLists());
   ++num_kept_;
+  last_num_bytes_ = num_bytes;
   return true;
 }
 

@@ -50,7 +50,8 @@ class RobotLog {
   RobotLog& operator=(RobotLog&& other) noexcept;
   ~RobotLog();
 
-  // Whether a frame with this fix would be kept if its bytes fit; if not, its features need not be known.
+  // Whether a frame with this fix may be kept: its place is new, and half of the last kept frame's bytes
+  // would fit.  If not, its features need not be known.
   bool IsWanted(const Pose& cam_from_world, const MachineClocks& now);
   // Whether the frame was kept.  Errors: Io, DiskFull; Corrupt.
   Result<bool> Offer(const LoggedFrame& frame, const MachineClocks& now);

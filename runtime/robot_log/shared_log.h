@@ -31,7 +31,7 @@ class SharedLog {
 
   // A frame that was localized; without a fix, or after Close, nothing happens.
   void Offer(const Query& query, const Localization& found);
-  // Its features are extracted only where it may be kept.
+  // Its features are extracted only where it may be kept; where they cannot be, it is not.
   void Offer(QueryFrame* frame, const Localization& found);
 
   // What keeps it from being written.

@@ -7,18 +7,16 @@
 #include "core/blocks/map_rows.h"
 #include "core/camera/pixel_ray.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
 
-// Coarse features are matched with landmarks that look this much smaller, too: neither their sizes nor the
-// distance are known exactly.
-constexpr double kSmallerRatio = 1.5;
 // Largest ratio of a feature's scale to the expected one, or of its inverse.
 constexpr double kMaxScaleRatio = 1.6;
 
-// How far a landmark may appear from where it is expected because its own place is not well known, radii.
+// How far a landmark may appear from where it is expected because places are not well known, radii.
 constexpr double kMaxRadii = 4;
 
 // A landmark where a pose puts it in the image.
@@ -47,34 +45,39 @@ bool IsLikeAny(const Keypoint& keypoint, const std::vector<ExpectedSight>& sight
   return false;
 }
 
-// Those that coarse features show.
+// Those that coarse features show: no others, as what is found of them is held against what should be
+// (PlaceEvidence).
 std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_from_world,
                                   const Query& query) {
   std::vector<LandmarkIdx> coarse;
   for (size_t i = 0; i < landmarks.idx.size(); ++i) {
     const MapLandmark& landmark = landmarks.landmarks[i];
     const double depth = DepthOfScale(query.camera, cam_from_world * landmark.position);
-    if (landmark.scale_m <= 0 || WasLookedFor(landmark, depth / kSmallerRatio, query))
-      coarse.push_back(landmarks.idx[i]);
+    if (WasLookedFor(landmark, depth, query)) coarse.push_back(landmarks.idx[i]);
   }
   return coarse;
 }
 
-// Where the pose puts those that fine features show, ordered by column.
-std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Pose& cam_from_world,
-                                      const Query& coarse, double radius_px) {
+// Where the fix puts those that fine features show, ordered by column.
+std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Localization& fix,
+                                      const Pose& camera_from_given, const Query& coarse, double radius_px) {
   constexpr double kNumSigmas = 3;
+  const Pose cam_from_world = camera_from_given * fix.cam_from_world;
+  const double sigma_rad = LargestSigma(fix.covariance.topLeftCorner<3, 3>());
+  const double sigma_m = LargestSigma(fix.covariance.bottomRightCorner<3, 3>());
   std::vector<ExpectedSight> sights;
   const double focal_px = coarse.camera.MeanFocal();
   for (const MapLandmark& landmark : landmarks.landmarks) {
     const Eigen::Vector3d point = cam_from_world * landmark.position;
     const auto pixel = ImageFromCamera(coarse.camera, point);
-    if (!pixel || !IsInImage(*pixel, coarse.camera) || landmark.scale_m <= 0) continue;
+    if (!pixel || !IsInImage(*pixel, coarse.camera)) continue;
     const double pixels_per_m = focal_px / DepthOfScale(coarse.camera, point);
     const double scale_px = landmark.scale_m * pixels_per_m;
     if (scale_px > kMaxScaleRatio * coarse.min_scale_px) continue;
-    const double own_px = kNumSigmas * pixels_per_m * std::sqrt(landmark.covariance.trace() / 3);
-    sights.push_back({*pixel, std::min(std::hypot(radius_px, own_px), kMaxRadii * radius_px), scale_px});
+    const double sigma_px = std::hypot(pixels_per_m * std::sqrt(landmark.covariance.trace() / 3),
+                                       pixels_per_m * sigma_m, focal_px * sigma_rad);
+    const double reach_px = std::min(std::hypot(radius_px, kNumSigmas * sigma_px), kMaxRadii * radius_px);
+    sights.push_back({*pixel, reach_px, scale_px});
   }
   std::sort(sights.begin(), sights.end(),
             [](const ExpectedSight& a, const ExpectedSight& b) { return a.pixel.x() < b.pixel.x(); });
@@ -87,11 +90,13 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                                       const Camera& camera, const std::vector<LandmarkIdx>& expected,
                                       const PosePrior& prior, const ExpectedFeaturesOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(expected, false));
-  const bool has_sizes = std::any_of(landmarks->landmarks.begin(), landmarks->landmarks.end(),
-                                     [](const MapLandmark& landmark) { return landmark.scale_m > 0; });
-  if (!has_sizes) {
+  const auto num_of_unknown_size =
+      std::count_if(landmarks->landmarks.begin(), landmarks->landmarks.end(),
+                    [](const MapLandmark& landmark) { return landmark.scale_m <= 0; });
+  if (2 * num_of_unknown_size >= static_cast<int64_t>(expected.size())) {
     return Localization{.reason = NoFix::kTooFewMatches,
-                        .message = fmt::format("of {} landmarks the size is not known", expected.size())};
+                        .message = fmt::format("of {} of {} landmarks the size is not known",
+                                               num_of_unknown_size, expected.size())};
   }
   CAIRN_ASSIGN_OR_RETURN(Query query, localizer.CoarseQueryFromImage(grey, camera));
   const int num_features = static_cast<int>(query.features.keypoints.size());
@@ -107,7 +112,7 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                               CoarseOf(*landmarks, camera_from_given * prior.cam_from_world, query), prior));
   if (!found.has_fix() || options.max_num_fine_features == 0) return found;
   const std::vector<ExpectedSight> sights =
-      FineSights(*landmarks, camera_from_given * found.cam_from_world, query, options.fine_radius_px);
+      FineSights(*landmarks, found, camera_from_given, query, options.fine_radius_px);
   CAIRN_RETURN_IF_ERROR(localizer.AddFineFeatures(
       grey, options.max_num_fine_features,
       [&](const Keypoint& keypoint) {

@@ -64,11 +64,14 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
 
 namespace {
 
-// A first pose of few matches is not far off where it agrees with the prediction, or else is not taken; and
-// as many samples are drawn as their matches ask for.
+// What saves time where all landmarks but few are the right ones: no more samples than the matches ask for
+// with the wanted confidence, and no wider search where a fix would be taken at once.
 LocalizerOptions ExpectingOptions(LocalizerOptions options) {
-  options.match.guided_widest = 1;
-  options.estimate.min_num_ransac_iterations = std::min(options.estimate.min_num_ransac_iterations, 16);
+  constexpr int kMinNumIterations = 16;
+  options.estimate.min_num_ransac_iterations =
+      std::min(options.estimate.min_num_ransac_iterations, kMinNumIterations);
+  options.match.guided_sure_num_inliers =
+      std::min(options.match.guided_sure_num_inliers, options.sure_num_unguided_inliers);
   return options;
 }
 
@@ -82,13 +85,17 @@ RegionTracker::RegionTracker(std::shared_ptr<const Map> map, const LocalizerOpti
       options_(options) {}
 
 Result<Localization> RegionTracker::Track(const cv::Mat& grey, const Camera& camera) {
-  QueryFrame frame(localizer_, grey, camera);
-  return TrackFrame(&frame);
+  return WithoutExceptions("track", [&]() -> Result<Localization> {
+    QueryFrame frame(localizer_, grey, camera);
+    return TrackFrame(&frame);
+  });
 }
 
 Result<Localization> RegionTracker::TrackFeatures(Features features, const Camera& camera) {
-  QueryFrame frame(localizer_, std::move(features), camera);
-  return TrackFrame(&frame);
+  return WithoutExceptions("track", [&]() -> Result<Localization> {
+    QueryFrame frame(localizer_, std::move(features), camera);
+    return TrackFrame(&frame);
+  });
 }
 
 Result<Localization> RegionTracker::TrackFrame(QueryFrame* frame) {

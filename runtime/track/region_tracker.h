@@ -17,8 +17,8 @@ struct ExpectedFeaturesOptions {
   // Coarse features (SiftScales) give a fix, and at most so many fine ones, the strongest near the landmarks
   // that it puts into the image, make it more exact.  0: none do.  REQUIRES: >= 0
   int max_num_fine_features = 300;
-  // How near, px, besides three standard deviations of the landmark's own place, in all at most four times so
-  // far.  REQUIRES: > 0
+  // How near, px, besides three standard deviations of the landmark's place and of the fix, in all at most
+  // four times so far.  REQUIRES: > 0
   double fine_radius_px = 3;
 };
 
@@ -98,7 +98,7 @@ class RegionTracker {
 
   std::shared_ptr<const Map> map_;
   Localizer localizer_;
-  Localizer expecting_localizer_;  // where a prediction is at hand
+  Localizer expecting_localizer_;  // where landmarks are expected
   RegionTrackerOptions options_;
   Pose last_, step_;  // of the last fix; from each frame's camera to the next one's
   RegionIdx region_ = -1;
