@@ -116,17 +116,6 @@ OptionTable DescribeOptions(PlaceBeliefOptions* o) {
   };
 }
 
-Status CheckUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
-  const double length = up_in_camera.norm();
-  if (!std::isfinite(length) || !(length > 0))
-    return MakeError(ErrorCode::kInvalidArgument, "gravity: ({}, {}, {}) is no direction", up_in_camera.x(),
-                     up_in_camera.y(), up_in_camera.z());
-  if (!(sigma_deg > 0) || !std::isfinite(sigma_deg))
-    return MakeError(ErrorCode::kInvalidArgument, "gravity: sigma of {} degrees; expected more than 0",
-                     sigma_deg);
-  return Ok();
-}
-
 PlaceBelief::PlaceBelief(std::shared_ptr<const Map> map, std::shared_ptr<const PlaceGraph> graph,
                          const PlaceBeliefOptions& options)
     : map_(std::move(map)), graph_(std::move(graph)), options_(options) {
@@ -165,7 +154,7 @@ Status PlaceBelief::Elapse(double seconds) {
 }
 
 Status PlaceBelief::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
-  CAIRN_RETURN_IF_ERROR(CheckUp(up_in_camera, sigma_deg));
+  CAIRN_RETURN_IF_ERROR(CheckSensedUp({up_in_camera, sigma_deg}));
   up_ = Up{up_in_camera.normalized(), sigma_deg};
   return Ok();
 }

@@ -64,9 +64,6 @@ struct PlaceBeliefOptions {
 };
 OptionTable DescribeOptions(PlaceBeliefOptions* options);
 
-// Whether this can be gravity's direction, and its error, degrees.  Errors: InvalidArgument.
-Status CheckUp(const Eigen::Vector3d& up_in_camera, double sigma_deg);
-
 // A place at which the robot may be: a survey image and those near it that show the same.
 struct PlaceHypothesis {
   int32_t image = 0;  // of these the likeliest: index in the map

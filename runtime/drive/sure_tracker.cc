@@ -80,7 +80,7 @@ Result<SureTracker> SureTracker::Make(std::shared_ptr<const Map> map,
 Status SureTracker::CheckBelieves() const {
   if (belief_) return Ok();
   return MakeError(ErrorCode::kInvalidArgument,
-                   "min_place_probability is 0: every fix is published, and nothing reads times or gravity; "
+                   "min_place_probability is 0: every fix is published, and nothing reads times; "
                    "set it, 0.9 say");
 }
 
@@ -104,9 +104,9 @@ Status SureTracker::Elapse(double seconds) {
 }
 
 Status SureTracker::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
-  CAIRN_RETURN_IF_ERROR(CheckBelieves());
-  CAIRN_RETURN_IF_ERROR(CheckUp(up_in_camera, sigma_deg));
-  up_.emplace(up_in_camera, sigma_deg);
+  const SensedUp up{up_in_camera, sigma_deg};
+  CAIRN_RETURN_IF_ERROR(CheckSensedUp(up));
+  up_ = up;
   return Ok();
 }
 
@@ -126,6 +126,8 @@ Result<Localization> SureTracker::TrackFeatures(Features features, const Camera&
 
 Result<Localization> SureTracker::TrackFrame(QueryFrame* frame) {
   return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
+    const std::optional<SensedUp> up = std::exchange(up_, std::nullopt);
+    if (up) frame->set_up(*up);
     CAIRN_ASSIGN_OR_RETURN(Localization found, tracker_->TrackFrame(frame));
     if (!belief_) return found;
     if (elapsed_s_) {
@@ -134,10 +136,9 @@ Result<Localization> SureTracker::TrackFrame(QueryFrame* frame) {
       since_look_s_ += 1;
       CAIRN_RETURN_IF_ERROR(belief_->Elapse(1));
     }
-    const auto up = std::exchange(up_, std::nullopt);
     const bool is_followed = found.has_fix() && found.scope == Scope::kTrack;
     if (!is_followed || sure_probability_ == 0 || since_look_s_ >= options_.look_anew_s) {
-      if (up) CAIRN_RETURN_IF_ERROR(belief_->SenseUp(up->first, up->second));
+      if (up) CAIRN_RETURN_IF_ERROR(belief_->SenseUp(up->direction, up->sigma_deg));
       CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
       CAIRN_ASSIGN_OR_RETURN(const Localization anew, LookAnew(*query, found));
       sure_probability_ = ProbabilityOf(found);

@@ -50,8 +50,9 @@ class SureTracker {
   // motion in space what is over the floor (OverFloor).  Errors: the same.
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
   Status Move(const UncertainPose& next_from_last);
-  // What else is known of the next frame besides its pixels: as PlaceBelief has it.  Errors: the same, and
-  // InvalidArgument where min_place_probability is 0, as nothing reads it.
+  // What else is known of the next frame besides its pixels: time as PlaceBelief has it, up as Localizer and
+  // PlaceBelief do.  Errors: the same, and InvalidArgument for a time where min_place_probability is 0, as
+  // nothing reads it.
   Status Elapse(double seconds);
   Status SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg);
 
@@ -86,7 +87,7 @@ class SureTracker {
   double since_look_s_ = 0;
   // Told of the next frame.
   std::optional<double> elapsed_s_;
-  std::optional<std::pair<Eigen::Vector3d, double>> up_;
+  std::optional<SensedUp> up_;
   double sure_probability_ = 0;  // of the place that is followed; 0: it is not sure
 };
 

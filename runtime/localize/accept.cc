@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "runtime/localize/place_evidence.h"
@@ -69,11 +70,12 @@ std::vector<Explanation> PlacesOf(const std::vector<Localization>& found, const 
   return places;
 }
 
-int NumCells(const Query& query, const std::vector<Correspondence>& inliers, int grid) {
-  std::set<std::pair<int, int>> cells;
+int NumCells(const Sighting& sighting, const std::vector<Correspondence>& inliers, int grid) {
+  std::set<std::tuple<int, int, int>> cells;
   for (const Correspondence& inlier : inliers) {
+    const Query& query = sighting.images[inlier.image];
     const Keypoint& keypoint = query.features.keypoints[inlier.keypoint];
-    cells.emplace(static_cast<int>(keypoint.x * grid / query.camera.width),
+    cells.emplace(inlier.image, static_cast<int>(keypoint.x * grid / query.camera.width),
                   static_cast<int>(keypoint.y * grid / query.camera.height));
   }
   return static_cast<int>(cells.size());
@@ -85,36 +87,43 @@ double Log10Choose(int n, int k) {
 
 }  // namespace
 
-double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
-                      double max_error_px, const Camera& camera) {
+double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& rig_from_world,
+                      double max_error_px, const Sighting& sighting) {
   constexpr size_t kMaxSamples = 400;  // matches looked at; pairs grow with their square
   const size_t stride = measurements.size() / kMaxSamples + 1;
-  std::vector<std::pair<const QueryRay*, Eigen::Vector2d>> samples;  // keypoint, its landmark's ray
+  struct Seen {
+    const PoseMeasurement* measurement;
+    Eigen::Vector2d ray;  // of the landmark
+  };
+  std::vector<Seen> samples;
   for (size_t i = 0; i < measurements.size(); i += stride) {
-    const Eigen::Vector3d point = cam_from_world * measurements[i].point;
-    if (point.z() > 0) samples.emplace_back(&measurements[i].ray, point.hnormalized());
+    const Eigen::Vector3d point = measurements[i].InCamera(rig_from_world * measurements[i].point);
+    if (point.z() > 0) samples.push_back({&measurements[i], point.hnormalized()});
   }
-  int64_t num_close = 0;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    for (size_t j = 0; j < samples.size(); ++j) {
-      const Eigen::Vector2d offset =
-          samples[i].first->pixel_from_ray * (samples[j].second - samples[i].first->ray);
-      num_close += i != j && offset.squaredNorm() <= max_error_px * max_error_px ? 1 : 0;
+  int64_t num_close = 0, num_pairs = 0;
+  for (const Seen& keypoint : samples) {
+    for (const Seen& landmark : samples) {
+      if (&keypoint == &landmark || keypoint.measurement->image != landmark.measurement->image) continue;
+      const QueryRay& ray = keypoint.measurement->ray;
+      num_close +=
+          (ray.pixel_from_ray * (landmark.ray - ray.ray)).squaredNorm() <= max_error_px * max_error_px ? 1
+                                                                                                       : 0;
+      ++num_pairs;
     }
   }
-  const double num_pairs =
-      std::max(1.0, static_cast<double>(samples.size()) * (static_cast<double>(samples.size()) - 1));
-  const double disc =
-      std::numbers::pi * max_error_px * max_error_px / (static_cast<double>(camera.width) * camera.height);
-  return std::min(1.0, std::max(disc, static_cast<double>(num_close) / num_pairs));
+  double area_px = 0;
+  for (const Query& query : sighting.images)
+    area_px += static_cast<double>(query.camera.width) * query.camera.height;
+  const double disc = std::numbers::pi * max_error_px * max_error_px / area_px * sighting.num_images();
+  return std::min(1.0, std::max(disc, static_cast<double>(num_close) /
+                                          static_cast<double>(std::max<int64_t>(1, num_pairs))));
 }
 
-double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier) {
-  constexpr int kSampleSize = 3;
-  if (num_inliers <= kSampleSize) return std::numeric_limits<double>::infinity();
-  return Log10Choose(num_matches, kSampleSize) +
-         Log10Choose(num_matches - kSampleSize, num_inliers - kSampleSize) +
-         (num_inliers - kSampleSize) * std::log10(chance_of_inlier);
+double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier, int sample_size) {
+  if (num_inliers <= sample_size) return std::numeric_limits<double>::infinity();
+  return Log10Choose(num_matches, sample_size) +
+         Log10Choose(num_matches - sample_size, num_inliers - sample_size) +
+         (num_inliers - sample_size) * std::log10(chance_of_inlier);
 }
 
 const char* NoFixName(NoFix reason) {
@@ -141,6 +150,8 @@ const char* NoFixName(NoFix reason) {
       return "ambiguous";
     case NoFix::kImprobable:
       return "improbable";
+    case NoFix::kTilted:
+      return "tilted";
   }
   return "none";
 }
@@ -194,6 +205,10 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .value = &o->max_sigma_deg,
        .help = "largest standard deviation of the rotation about the worst axis, degrees",
        .min = 1e-6},
+      {.name = "max_up_sigmas",
+       .value = &o->max_up_sigmas,
+       .help = "where up is sensed: largest angle between it and the fix's up, standard deviations",
+       .min = 0.1},
       {.name = "max_distance_from_survey_m",
        .value = &o->max_distance_from_survey_m,
        .help = "largest distance from the nearest survey image, m; 0: any",
@@ -233,13 +248,14 @@ Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& op
   return {};
 }
 
-Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit) {
+Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers,
+                  const Sighting& sighting, double distance_from_survey_m, const AcceptOptions& options,
+                  const char* length_unit) {
   if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
     return {NoFix::kTooFewInliers,
             fmt::format("{} inliers, at least {} are needed", inliers.size(), options.min_num_inliers)};
   }
-  const int num_cells = NumCells(query, inliers, options.spread_grid);
+  const int num_cells = NumCells(sighting, inliers, options.spread_grid);
   if (num_cells < options.min_num_cells) {
     return {NoFix::kPoorSpread, fmt::format("inliers in {} cells of the image, at least {} are needed",
                                             num_cells, options.min_num_cells)};
@@ -250,6 +266,15 @@ Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& in
     return {NoFix::kUncertain,
             fmt::format("standard deviation {:.3f} {} and {:.2f} degrees, at most {} and {} are allowed",
                         sigma_m, length_unit, sigma_deg, options.max_sigma_m, options.max_sigma_deg)};
+  }
+  const double up_sigmas = sighting.up ? UpErrorInSigmas(*sighting.up, pose.cam_from_world) : 0;
+  if (up_sigmas > options.max_up_sigmas) {
+    const double sigma_up_deg = DegFromRad(sighting.up->sigma_rad);
+    return {
+        NoFix::kTilted,
+        fmt::format("up is {:.1f} degrees off the sensed one, at most {:.1f} are allowed; if fixes without "
+                    "gravity are right, the map's up is not, or the sensor's axes are not the camera's",
+                    up_sigmas * sigma_up_deg, options.max_up_sigmas * sigma_up_deg)};
   }
   if (options.max_distance_from_survey_m > 0 && distance_from_survey_m > options.max_distance_from_survey_m) {
     return {NoFix::kFarFromSurvey,

@@ -13,15 +13,16 @@ namespace cairn {
 
 // Probability that a keypoint lies within `max_error_px` of a landmark that it does not show, at this pose:
 // measured on the matches themselves, each keypoint against the other matches' landmarks, and no less than a
-// disc's share of the image.  Near 1 where all landmarks project into one corner: there, inliers say nothing.
-double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
-                      double max_error_px, const Camera& camera);
+// disc's share of the images.  Near 1 where all landmarks project into one corner: there, inliers say
+// nothing.
+double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& rig_from_world,
+                      double max_error_px, const Sighting& sighting);
 
 // Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches
-// at random:
-//   C(n, 3) C(n - 3, m - 3) p^(m - 3)
+// at random, where s of them determine one (3; 2 with up):
+//   C(n, s) C(n - s, m - s) p^(m - s)
 // [Moisan & Stival, "A probabilistic criterion to detect rigid point matches", 2004: number of false alarms]
-double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier);
+double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier, int sample_size = 3);
 
 struct Verdict {
   NoFix reason = NoFix::kNone;
@@ -32,9 +33,11 @@ struct Verdict {
 // places by chance.
 Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& options);
 
-// Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey.
-Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit);
+// Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey, and upright
+// where up is known.
+Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers,
+                  const Sighting& sighting, double distance_from_survey_m, const AcceptOptions& options,
+                  const char* length_unit);
 
 // Whether two poses are at different places.
 bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept);

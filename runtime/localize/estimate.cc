@@ -14,13 +14,15 @@
 namespace cairn {
 namespace {
 
-constexpr int kSampleSize = 3;
+constexpr int kMaxSampleSize = 3;
 constexpr int kMinNumInliers = 4;
+// A pose that has up farther than so many standard deviations from where it was sensed is none.
+constexpr double kMaxUpSigmas = 4;
 
 // Squared reprojection error in px, at most `limit`.
 double TruncatedError(const PoseMeasurement& measurement, const Eigen::Matrix3d& rotation,
                       const Eigen::Vector3d& translation, double limit) {
-  const Eigen::Vector3d x = rotation * measurement.point + translation;
+  const Eigen::Vector3d x = measurement.InCamera(rotation * measurement.point + translation);
   if (!(x.z() > 0)) return limit;
   const double error =
       (measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray)).squaredNorm();
@@ -48,8 +50,11 @@ std::vector<int> Inliers(const std::vector<PoseMeasurement>& measurements, const
   return inliers;
 }
 
-std::vector<Pose> SolveThreePoints(const std::vector<PoseMeasurement>& measurements,
-                                   const std::array<int, kSampleSize>& sample) {
+using Sample = std::array<int, kMaxSampleSize>;  // indices of measurements
+
+// Of one camera: its poses.
+std::vector<Pose> SolveThreePointsOfCamera(const std::vector<PoseMeasurement>& measurements,
+                                           const Sample& sample) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> rays;
   // Relative to the first point: P3P loses digits far from the origin.
@@ -75,9 +80,57 @@ std::vector<Pose> SolveThreePoints(const std::vector<PoseMeasurement>& measureme
   return poses;
 }
 
-std::array<int, kSampleSize> DrawSample(int num_measurements, Random& random) {
-  std::array<int, kSampleSize> sample;
-  for (int k = 0; k < kSampleSize; ++k) {
+RigRay RayOf(const PoseMeasurement& measurement) {
+  const Eigen::Vector3d in_camera = measurement.ray.ray.homogeneous().normalized();
+  if (!measurement.cam_from_rig) return {Eigen::Vector3d::Zero(), in_camera};
+  return {measurement.cam_from_rig->Center(), measurement.cam_from_rig->rotation.conjugate() * in_camera};
+}
+
+// The first N of a sample.
+template <size_t N>
+std::pair<std::array<RigRay, N>, std::array<Eigen::Vector3d, N>> RaysAndPointsOf(
+    const std::vector<PoseMeasurement>& measurements, const Sample& sample) {
+  std::array<RigRay, N> rays;
+  std::array<Eigen::Vector3d, N> points;
+  for (size_t i = 0; i < N; ++i) {
+    rays[i] = RayOf(measurements[sample[i]]);
+    points[i] = measurements[sample[i]].point;
+  }
+  return {rays, points};
+}
+
+std::vector<Pose> SolveThreePoints(const std::vector<PoseMeasurement>& measurements, const Sample& sample) {
+  const PoseMeasurement& first = measurements[sample[0]];
+  if (std::all_of(sample.begin(), sample.end(),
+                  [&](int i) { return measurements[i].image == first.image; })) {
+    std::vector<Pose> poses = SolveThreePointsOfCamera(measurements, sample);
+    if (first.cam_from_rig) {
+      for (Pose& pose : poses) pose = first.cam_from_rig->Inverse() * pose;
+    }
+    return poses;
+  }
+  const auto [rays, points] = RaysAndPointsOf<3>(measurements, sample);
+  return PosesFromThreeRays(rays, points);
+}
+
+std::vector<Pose> SolveTwoPoints(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
+                                 const KnownDirection& up) {
+  const auto [rays, points] = RaysAndPointsOf<2>(measurements, sample);
+  return PosesFromTwoRays(rays, points, up);
+}
+
+// The poses that a sample leads to.
+std::vector<Pose> Solve(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
+                        int sample_size, const std::optional<UpMeasurement>& up) {
+  if (sample_size == 2) return SolveTwoPoints(measurements, sample, up->up);
+  std::vector<Pose> poses = SolveThreePoints(measurements, sample);
+  if (up) std::erase_if(poses, [&](const Pose& pose) { return UpErrorInSigmas(*up, pose) > kMaxUpSigmas; });
+  return poses;
+}
+
+Sample DrawSample(int num_measurements, int sample_size, Random& random) {
+  Sample sample{};
+  for (int k = 0; k < sample_size; ++k) {
     do {
       sample[k] = static_cast<int>(random.UniformInt(0, num_measurements - 1));
     } while (std::find(sample.begin(), sample.begin() + k, sample[k]) != sample.begin() + k);
@@ -86,9 +139,10 @@ std::array<int, kSampleSize> DrawSample(int num_measurements, Random& random) {
 }
 
 // Number of samples needed so that, with the wanted confidence, one has inliers only.
-int NumIterations(size_t num_inliers, size_t num_measurements, const EstimateOptions& options) {
+int NumIterations(size_t num_inliers, size_t num_measurements, int sample_size,
+                  const EstimateOptions& options) {
   const double ratio = static_cast<double>(num_inliers) / static_cast<double>(num_measurements);
-  const double good = std::pow(ratio, kSampleSize);
+  const double good = std::pow(ratio, sample_size);
   if (good >= 1) return options.min_num_ransac_iterations;
   const double needed = std::log(1 - options.confidence) / std::log1p(-good);
   return static_cast<int>(std::clamp(needed, static_cast<double>(options.min_num_ransac_iterations),
@@ -168,11 +222,22 @@ OptionTable DescribeOptions(EstimateOptions* o) {
   };
 }
 
+bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
+                   const EstimateOptions& options) {
+  if (!up || measurements.empty()) return false;
+  // An error of up moves points in the image: about those of the sample that are inliers then, local
+  // refinement finds the others.
+  constexpr double kMaxErrors = 3;
+  const double focal_px = std::sqrt(std::abs(measurements.front().ray.pixel_from_ray.determinant()));
+  return up->sigma_rad * focal_px <= kMaxErrors * options.max_error_px;
+}
+
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
                                         const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed) {
+                                        uint64_t seed, const std::optional<UpMeasurement>& up) {
   const int num_measurements = static_cast<int>(measurements.size());
   if (num_measurements < kMinNumInliers) return {};
+  const int sample_size = UsesTwoPoints(measurements, up, options) ? 2 : 3;
   const double limit = options.max_error_px * options.max_error_px;
   std::vector<ScoredPose> best;  // by score
   Random random(seed);
@@ -181,15 +246,15 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
   int num_iterations = std::max(options.min_num_ransac_iterations, options.max_num_ransac_iterations);
   int iteration = 0;
   for (; iteration < num_iterations; ++iteration) {
-    const auto sample = DrawSample(num_measurements, random);
-    for (const Pose& pose : SolveThreePoints(measurements, sample)) {
+    const Sample sample = DrawSample(num_measurements, sample_size, random);
+    for (const Pose& pose : Solve(measurements, sample, sample_size, up)) {
       const double needed = ScoreNeeded(best, max_num_poses, limit, num_measurements);
       double score = Score(measurements, pose, limit, needed);
       if (score >= needed) continue;
       Pose local = pose;
       std::vector<int> inliers = Inliers(measurements, pose, limit);
       for (int round = 0; round < 3 && inliers.size() >= kMinNumInliers; ++round) {
-        const auto refined = RefinePose(Select(measurements, inliers), local, local_options);
+        const auto refined = RefinePose(Select(measurements, inliers), local, local_options, up);
         const double refined_score = refined ? Score(measurements, *refined, limit, score) : score;
         if (!(refined_score < score)) break;
         local = *refined;
@@ -197,7 +262,8 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
         inliers = Inliers(measurements, local, limit);
       }
       Insert({{local, std::move(inliers)}, score}, max_num_poses, &best);
-      num_iterations = NumIterations(best.front().estimate.inliers.size(), measurements.size(), options);
+      num_iterations =
+          NumIterations(best.front().estimate.inliers.size(), measurements.size(), sample_size, options);
     }
   }
   std::vector<PoseEstimate> poses;
@@ -210,15 +276,16 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
 
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
-                                         uint64_t seed) {
-  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed);
+                                         uint64_t seed, const std::optional<UpMeasurement>& up) {
+  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed, up);
   if (poses.empty()) return std::nullopt;
   return std::move(poses.front());
 }
 
 std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
-                                              const RefineOptions& refine_options, uint64_t seed) {
+                                              const RefineOptions& refine_options, uint64_t seed,
+                                              const std::optional<UpMeasurement>& up) {
   std::vector<int> indices;
   for (size_t i = 0, next = 0; i < measurements.size(); ++i) {
     if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
@@ -227,7 +294,7 @@ std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>
       indices.push_back(static_cast<int>(i));
     }
   }
-  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed);
+  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed, up);
   if (!other) return std::nullopt;
   for (int& i : other->inliers) i = indices[i];
   return other;

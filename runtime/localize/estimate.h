@@ -18,22 +18,30 @@ struct PoseEstimate {
   int num_iterations = 0;
 };
 
-// Pose from correspondences of which many are wrong: RANSAC over three points (P3P, OpenCV), truncated
-// squared errors as score, each best pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler,
-// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result.
+// Whether poses come from two points and up, where up is known; else from three, of which those that tilt the
+// camera are left out.
+bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
+                   const EstimateOptions& options);
+
+// Pose from correspondences of which many are wrong: RANSAC over three points of a camera (P3P, OpenCV) or of
+// several (core/geometry/minimal_pose.h), or over two and up; truncated squared errors as score, each best
+// pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler, "Locally Optimized RANSAC", 2003).
+// Same measurements and seed, same result.
 //
 // Up to so many poses, the best first: no two share more than nine tenths of the fewer inliers, and one
 // that has a quarter fewer inliers than the best may not be found.
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
                                         const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed);
+                                        uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt);
 // The best of them.  Nothing when no pose has at least 4 inliers.
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
-                                         uint64_t seed);
+                                         uint64_t seed,
+                                         const std::optional<UpMeasurement>& up = std::nullopt);
 // The best of the measurements that are no inliers of a first.
 std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
-                                              const RefineOptions& refine_options, uint64_t seed);
+                                              const RefineOptions& refine_options, uint64_t seed,
+                                              const std::optional<UpMeasurement>& up = std::nullopt);
 
 }  // namespace cairn

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "core/base/error.h"
 #include "core/base/ids.h"
 #include "core/geometry/pose.h"
 
@@ -19,6 +20,14 @@ struct PosePrior {
   double sigma_deg = 10;  // of its rotation
 };
 
+// Which way is up, as an accelerometer says while the robot does not speed up or brake, or an IMU.
+struct SensedUp {
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitY();  // in the camera's frame (a rig's), of any length
+  double sigma_deg = 1;                                   // per axis
+};
+// Errors: InvalidArgument where it is no direction, or not as uncertain as anything.
+Status CheckSensedUp(const SensedUp& up);
+
 // Why there is no fix.
 enum class NoFix {
   kNone,            // there is one
@@ -32,6 +41,7 @@ enum class NoFix {
   kFarFromSurvey,   // they put the camera where nobody surveyed
   kAmbiguous,       // another pose is nearly as good
   kImprobable,      // most of what an image from there would show is missing
+  kTilted,          // up is not where it was sensed
 };
 // Stable lower-case name ("too_few_matches"); "none" for kNone.
 const char* NoFixName(NoFix reason);
@@ -49,7 +59,7 @@ struct Localization {
   bool has_places() const { return has_fix() || !possible_poses.empty(); }
 
   // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given
-  // is applied).
+  // is applied).  Of a rig it is the rig's.
   Pose cam_from_world;
   // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
   // (Exp(rotation), translation) * cam_from_world.

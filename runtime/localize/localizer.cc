@@ -31,15 +31,6 @@ std::vector<Correspondence> Select(const std::vector<Correspondence>& correspond
   return selected;
 }
 
-// Ascending, each once.
-std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
-  std::vector<LandmarkIdx> landmarks;
-  for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
-  return landmarks;
-}
-
 Localization Failure(NoFix reason, std::string message) {
   Localization localization;
   localization.reason = reason;
@@ -48,12 +39,13 @@ Localization Failure(NoFix reason, std::string message) {
 }
 
 // Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
-// not by different places.  Ascending by keypoint.
+// not by different places.  Ascending by image and keypoint.
 bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspondence>& b) {
+  const auto keypoint = [](const Correspondence& match) { return std::pair(match.image, match.keypoint); };
   size_t num_shared = 0;
   for (size_t i = 0, j = 0; i < a.size() && j < b.size();) {
-    num_shared += a[i].keypoint == b[j].keypoint && a[i].landmark == b[j].landmark ? 1 : 0;
-    a[i].keypoint < b[j].keypoint ? ++i : ++j;
+    num_shared += keypoint(a[i]) == keypoint(b[j]) && a[i].landmark == b[j].landmark ? 1 : 0;
+    keypoint(a[i]) < keypoint(b[j]) ? ++i : ++j;
   }
   return 2 * num_shared >= std::min(a.size(), b.size());
 }
@@ -104,17 +96,21 @@ Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& opt
 }
 
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
-                                         const std::optional<PosePrior>& prior) {
+                                         const std::optional<PosePrior>& prior,
+                                         const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize", [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromImage(grey, camera));
+    CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromImage(grey, camera));
+    if (up) CAIRN_RETURN_IF_ERROR(SetUp(*up, &query));
     return LocalizeQuery(query, prior);
   });
 }
 
 Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
-                                                 const std::optional<PosePrior>& prior) {
+                                                 const std::optional<PosePrior>& prior,
+                                                 const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize", [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromFeatures(std::move(features), camera));
+    CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(features), camera));
+    if (up) CAIRN_RETURN_IF_ERROR(SetUp(*up, &query));
     return LocalizeQuery(query, prior);
   });
 }
@@ -163,9 +159,18 @@ Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& came
   return MakeQuery(std::move(features), AsFound(map_->head(), camera), options_.measurement);
 }
 
-Result<Localization> Localizer::LocalizeQuery(const Query& query,
+Status Localizer::SetUp(const SensedUp& up, Query* query) const {
+  CAIRN_RETURN_IF_ERROR(CheckSensedUp(up));
+  const MapHead& head = map_->head();
+  query->up = UpMeasurement{{head.camera_from_given.rotation * up.direction.normalized(),
+                             head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ()},
+                            RadFromDeg(std::hypot(up.sigma_deg, options_.floor_up_sigma_deg))};
+  return Ok();
+}
+
+Result<Localization> Localizer::LocalizeQuery(const Sighting& query,
                                               const std::optional<PosePrior>& prior) const {
-  const int num_features = static_cast<int>(query.features.keypoints.size());
+  const int num_features = query.num_features();
   if (num_features < options_.accept.min_num_features) {
     Localization none = Failure(
         NoFix::kTooFewFeatures,
@@ -177,22 +182,24 @@ Result<Localization> Localizer::LocalizeQuery(const Query& query,
 }
 
 Result<Localization> Localizer::LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const {
-  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {Scope::kVotes, std::move(voted)}));
+  CAIRN_ASSIGN_OR_RETURN(Localization localization,
+                         Try(query, WithAllImages(Scope::kVotes, std::move(voted), query)));
   if (localization.has_fix() && localization.num_unguided_inliers >= options_.sure_num_unguided_inliers)
     return Answer(query, std::nullopt, std::move(localization));
   return LocalizeBetter(query, std::nullopt, std::move(localization));
 }
 
-Result<Localization> Localizer::LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
+Result<Localization> Localizer::LocalizeBetter(const Sighting& sighting,
+                                               const std::optional<PosePrior>& prior,
                                                Localization best) const {
   std::vector<ImageId> candidate_ids;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(sighting, prior, &candidate_ids));
   for (const Attempt& attempt : attempts) {
-    CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, attempt));
+    CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(sighting, attempt));
     best = BetterOf(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
-  CAIRN_ASSIGN_OR_RETURN(best, Answer(query, prior, std::move(best)));
+  CAIRN_ASSIGN_OR_RETURN(best, Answer(sighting, prior, std::move(best)));
   best.candidates = std::move(candidate_ids);
   return best;
 }
@@ -200,16 +207,17 @@ Result<Localization> Localizer::LocalizeBetter(const Query& query, const std::op
 Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
                                               std::vector<LandmarkIdx> landmarks,
                                               const std::optional<PosePrior>& prior) const {
-  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {scope, std::move(landmarks)}));
+  CAIRN_ASSIGN_OR_RETURN(Localization localization,
+                         Try(query, WithAllImages(scope, std::move(landmarks), query)));
   return Answer(query, prior, std::move(localization));
 }
 
-Result<Localization> Localizer::Answer(const Query& query, const std::optional<PosePrior>& prior,
+Result<Localization> Localizer::Answer(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                        Localization localization) const {
   if (options_.exclude_look_alikes && localization.has_places()) {
-    CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(query, prior, std::move(localization)));
+    CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(sighting, prior, std::move(localization)));
   }
-  localization.num_features = static_cast<int>(query.features.keypoints.size());
+  localization.num_features = sighting.num_features();
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
   for (Pose& pose : localization.possible_poses) pose = given_from_camera * pose;
   if (localization.has_fix()) PutInGivenFrame(&localization);
@@ -232,7 +240,7 @@ Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& l
   const Pose first = map_->head().camera_from_given * fix.cam_from_world;
   const std::vector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
   const auto refined =
-      RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first, options_.refine);
+      RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first, options_.refine, query.up);
   if (!refined || static_cast<int>(refined->inliers.size()) <= fix.num_inliers ||
       AreFarApart(refined->cam_from_world, first, options_.accept))
     return fix;
@@ -249,44 +257,7 @@ Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& l
   return fix;
 }
 
-Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Query& query,
-                                                                const std::optional<PosePrior>& prior,
-                                                                std::vector<ImageId>* candidate_ids) const {
-  std::vector<Attempt> attempts;
-  const auto add = [&](Scope scope, std::vector<LandmarkIdx> landmarks) {
-    if (landmarks.empty()) return;
-    for (const Attempt& attempt : attempts) {
-      if (attempt.landmarks == landmarks) return;
-    }
-    attempts.push_back({scope, std::move(landmarks)});
-  };
-  if (prior) {
-    CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, *prior, options_.retrieve));
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(near)));
-    add(Scope::kPrior, std::move(landmarks));
-  }
-  CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, options_.retrieve));
-  for (const Candidate& candidate : candidates) {
-    CAIRN_ASSIGN_OR_RETURN(const auto image, map_->Image(candidate.image));
-    candidate_ids->push_back(image->image_id);
-  }
-  CAIRN_ASSIGN_OR_RETURN(const auto regions, RegionsOfCandidates(*map_, candidates, options_.retrieve));
-  CAIRN_ASSIGN_OR_RETURN(auto of_regions, LandmarksOfRegions(*map_, regions));
-  CAIRN_ASSIGN_OR_RETURN(auto of_images, LandmarksOfImages(*map_, ImagesOf(candidates)));
-  const bool images_first = options_.first_landmarks == "images" ||
-                            (options_.first_landmarks == "auto" && map_->head().landmark_choice != "regions");
-  if (images_first) add(Scope::kImages, of_images);
-  add(Scope::kRegions, std::move(of_regions));
-  add(Scope::kImages, std::move(of_images));
-  if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
-    std::vector<LandmarkIdx> all(map_->num_landmarks());
-    std::iota(all.begin(), all.end(), 0);
-    add(Scope::kAll, std::move(all));
-  }
-  return attempts;
-}
-
-Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) const {
+Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& attempt) const {
   const AcceptOptions& accept = options_.accept;
   Localization localization;
   localization.scope = attempt.scope;
@@ -296,24 +267,41 @@ Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) 
     return localization;
   };
 
-  const bool all = static_cast<int64_t>(attempt.landmarks.size()) == map_->num_landmarks();
-  CAIRN_ASSIGN_OR_RETURN(const auto landmarks,
-                         all ? map_->AllLandmarks() : map_->Gather(attempt.landmarks, true));
-  const std::vector<Correspondence> matches = MatchLandmarks(query, *landmarks, options_.match);
+  std::shared_ptr<const LandmarkSet> landmarks;  // of all images
+  std::vector<Correspondence> matches;
+  for (int image = 0; image < sighting.num_images(); ++image) {
+    const std::vector<LandmarkIdx>& idx = attempt.landmarks[image];
+    const bool is_known = image > 0 && idx == attempt.landmarks[image - 1];
+    if (!is_known) {
+      const bool all = static_cast<int64_t>(idx.size()) == map_->num_landmarks();
+      CAIRN_ASSIGN_OR_RETURN(landmarks, all ? map_->AllLandmarks() : map_->Gather(idx, true));
+    }
+    for (Correspondence match : MatchLandmarks(sighting.images[image], *landmarks, options_.match)) {
+      match.image = image;
+      matches.push_back(match);
+    }
+  }
+  const bool are_same = std::all_of(attempt.landmarks.begin(), attempt.landmarks.end(),
+                                    [&](const auto& idx) { return idx == attempt.landmarks.front(); });
+  if (!are_same) {
+    CAIRN_ASSIGN_OR_RETURN(landmarks, map_->Gather(LandmarksOf(matches), false));
+  }
   localization.num_matches = static_cast<int>(matches.size());
   if (localization.num_matches < accept.min_num_matches) {
     return fail(NoFix::kTooFewMatches,
                 fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
-                            attempt.landmarks.size(), accept.min_num_matches));
+                            attempt.num_landmarks(), accept.min_num_matches));
   }
-  const std::vector<PoseMeasurement> measurements = MakeMeasurements(query, *landmarks, matches);
-  const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
+  const std::vector<PoseMeasurement> measurements = MakeMeasurements(sighting, *landmarks, matches);
+  const std::optional<UpMeasurement>& up = sighting.up;
+  const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed, up);
   if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
   const double chance_of_inlier =
-      ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, query.camera);
+      ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, sighting);
   const double log10_chance =
-      Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier);
+      Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier,
+                       UsesTwoPoints(measurements, up, options_.estimate) ? 2 : 3);
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
       log10_chance > accept.max_log10_chance) {
     return fail(NoFix::kTooFewInliers,
@@ -325,18 +313,18 @@ Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) 
   std::vector<PoseEstimate> firsts;
   if (localization.num_unguided_inliers < options_.sure_num_unguided_inliers) {
     for (PoseEstimate& first : EstimatePoses(measurements, options_.estimate.max_num_first_poses,
-                                             options_.estimate, options_.refine, kRansacSeed)) {
+                                             options_.estimate, options_.refine, kRansacSeed, up)) {
       if (static_cast<int>(first.inliers.size()) >= accept.min_num_unguided_inliers)
         firsts.push_back(std::move(first));
     }
   }
   // Of smaller errors, they may have fewer inliers than the one that was accepted.
   if (firsts.empty()) firsts.push_back(*estimate);
-  if (auto second = SecondPose(measurements, *estimate)) firsts.push_back(*std::move(second));
-  return Refine(query, *landmarks, matches, firsts, std::move(localization));
+  if (auto second = SecondPose(measurements, *estimate, up)) firsts.push_back(*std::move(second));
+  return Refine(sighting, *landmarks, matches, firsts, std::move(localization));
 }
 
-Result<Localizer::FollowedUp> Localizer::FollowUp(const Query& query,
+Result<Localizer::FollowedUp> Localizer::FollowUp(const Sighting& sighting,
                                                   const std::vector<Correspondence>& matches,
                                                   const PoseEstimate& first) const {
   FollowedUp own{static_cast<int>(first.inliers.size()),
@@ -344,22 +332,22 @@ Result<Localizer::FollowedUp> Localizer::FollowUp(const Query& query,
                  {Select(matches, first.inliers), first.cam_from_world}};
   if (options_.match.guided_num_images == 0) return own;
   CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
-                         CovisibleLandmarks(*map_, LandmarksOf(own.found.matches), options_.match));
+                         LandmarksToLookFor(sighting, own.found.matches, first.cam_from_world));
   CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(std::move(seen), false));
   GuidedMatches guided =
-      MatchGuidedInRounds(query, *covisible, first, options_.match, options_.estimate, options_.refine);
+      MatchGuidedInRounds(sighting, *covisible, first, options_.match, options_.estimate, options_.refine);
   if (guided.matches.size() < own.found.matches.size()) return own;
   return FollowedUp{own.num_unguided_inliers, std::move(covisible), std::move(guided)};
 }
 
-Result<PlaceEvidence> Localizer::EvidenceOf(const Query& query, const LandmarkSet& matched,
+Result<PlaceEvidence> Localizer::EvidenceOf(const Sighting& sighting, const LandmarkSet& matched,
                                             const FollowedUp& followed_up) const {
-  return EvidenceOfPlace(*map_, query, followed_up.found.cam_from_world,
+  return EvidenceOfPlace(*map_, sighting, followed_up.found.cam_from_world,
                          followed_up.covisible ? *followed_up.covisible : matched, followed_up.found.matches,
                          followed_up.num_unguided_inliers, options_.accept.spread_grid);
 }
 
-Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& matched,
+Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkSet& matched,
                                        const std::vector<Correspondence>& matches,
                                        const std::vector<PoseEstimate>& firsts,
                                        Localization localization) const {
@@ -372,7 +360,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   std::vector<FollowedUp> followed_up;
   size_t most = 0;
   for (const PoseEstimate& first : firsts) {
-    CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(query, matches, first));
+    CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(sighting, matches, first));
     followed_up.push_back(std::move(next));
     if (followed_up.back().found.matches.size() > followed_up[most].found.matches.size())
       most = followed_up.size() - 1;
@@ -391,39 +379,39 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     const bool is_weak = best.num_unguided_inliers >= options_.sure_num_unguided_inliers &&
                          other.num_unguided_inliers < max_second_pose_ratio * best.num_unguided_inliers;
     if (!is_weak && static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
-      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(query, matched, best));
-      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(query, matched, other));
+      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(sighting, matched, best));
+      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(sighting, matched, other));
       return Ambiguous(std::move(localization), {best.found.cam_from_world, other.found.cam_from_world},
                        {OddsOfPlace(here), OddsOfPlace(there)}, odds_elsewhere,
                        fmt::format("{} and {} matches agree on poses at different places",
                                    best.found.matches.size(), other.found.matches.size()));
     }
-    CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(query, matched, other));
+    CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(sighting, matched, other));
     odds_elsewhere += OddsOfPlace(evidence);
   }
   const LandmarkSet& landmarks = best.covisible ? *best.covisible : matched;
   if (best.covisible) {
-    Verdict verdict = JudgeGuided(static_cast<int>(best.found.matches.size()),
-                                  GuidedByChance(query, landmarks, best.found.cam_from_world, options_.match),
-                                  options_.accept);
+    Verdict verdict = JudgeGuided(
+        static_cast<int>(best.found.matches.size()),
+        GuidedByChance(sighting, landmarks, best.found.cam_from_world, options_.match), options_.accept);
     if (verdict.reason != NoFix::kNone) {
       localization.num_inliers = 0;
       return fail(verdict.reason, std::move(verdict.message));
     }
   }
-  CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(query, matched, best));
+  CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(sighting, matched, best));
   localization.probability = ProbabilityAmong(OddsOfPlace(evidence), odds_elsewhere);
   if (localization.probability < options_.accept.min_probability) {
     return fail(
         NoFix::kImprobable,
-        fmt::format(
-            "an image from there would show {:.0f} landmarks in {} parts of the image; {} are recognized, "
-            "and {} parts show any: right with a probability of {:.2f}, {} is needed",
-            evidence.num_expected, evidence.num_cells_expected, evidence.num_matched,
-            evidence.num_cells_found, localization.probability, options_.accept.min_probability));
+        fmt::format("an image from there would show {:.0f} landmarks in {:.0f} parts of the image; {} are "
+                    "recognized, "
+                    "and {:.0f} parts show any: right with a probability of {:.2f}, {} is needed",
+                    evidence.num_expected, evidence.num_cells_expected, evidence.num_matched,
+                    evidence.num_cells_found, localization.probability, options_.accept.min_probability));
   }
-  const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, landmarks, best.found.matches),
-                                                best.found.cam_from_world, options_.refine);
+  const auto refined = RefinePoseWithCovariance(MakeMeasurements(sighting, landmarks, best.found.matches),
+                                                best.found.cam_from_world, options_.refine, sighting.up);
   if (!refined) {
     return fail(NoFix::kUncertain,
                 fmt::format("{} inliers do not determine the pose", best.found.matches.size()));
@@ -440,7 +428,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   }
   CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
   Verdict verdict =
-      JudgePose(*refined, inliers, query, distance, options_.accept, LengthUnit(map_->head().frame));
+      JudgePose(*refined, inliers, sighting, distance, options_.accept, LengthUnit(map_->head().frame));
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
   localization.reason = NoFix::kNone;
   localization.cam_from_world = refined->cam_from_world;
@@ -450,7 +438,8 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
 }
 
 std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurement>& measurements,
-                                                  const PoseEstimate& first) const {
+                                                  const PoseEstimate& first,
+                                                  const std::optional<UpMeasurement>& up) const {
   const AcceptOptions& accept = options_.accept;
   if (accept.max_second_pose_ratio <= 0) return std::nullopt;
   // What it leads to tells more than what it begins with.
@@ -462,7 +451,7 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
   estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
   estimate_options.min_num_ransac_iterations =
       std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
-  auto second = EstimateOtherPose(measurements, first, estimate_options, options_.refine, kRansacSeed);
+  auto second = EstimateOtherPose(measurements, first, estimate_options, options_.refine, kRansacSeed, up);
   if (!second || static_cast<double>(second->inliers.size()) < needed ||
       !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
     return std::nullopt;
@@ -473,6 +462,7 @@ Result<const Query*> QueryFrame::WithAllFeatures() {
   if (!query_) {
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_)
                                               : localizer_.QueryFromFeatures(features_, camera_));
+    if (up_) CAIRN_RETURN_IF_ERROR(localizer_.SetUp(*up_, &query));
     query_ = std::make_shared<const Query>(std::move(query));
   }
   return query_.get();

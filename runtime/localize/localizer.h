@@ -20,11 +20,25 @@ namespace cairn {
 
 // runtime/localize/measurement.h, estimate.h and place_evidence.h:
 struct Query;
+struct Sighting;
+struct UpMeasurement;
 struct Correspondence;
 struct PoseMeasurement;
 struct PoseEstimate;
 struct PlaceEvidence;
 struct LandmarkSet;  // runtime/map/landmark_set.h
+
+// An image that a camera of a rig takes at the same time as the others take theirs.
+struct RigImage {
+  cv::Mat grey;
+  Camera camera;
+  Pose cam_from_rig;  // frames of cameras are those in which the capture states poses
+};
+struct RigFeatures {
+  Features features;
+  Camera camera;
+  Pose cam_from_rig;
+};
 
 // Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {
@@ -34,13 +48,27 @@ class Localizer {
   // From 8-bit grey pixels of the camera's size.  Same image, same result.  Errors: InvalidArgument (not
   // 8-bit grey; a camera that is invalid or of another size); Corrupt, Io (a part of the map that is needed
   // is damaged or cannot be read).  An image that cannot be localized is no error: see Localization::reason.
+  // `up`: a pose from two landmarks, not three, and none that tilts the camera; errors: as CheckSensedUp.
   // No exception leaves it.
   Result<Localization> Localize(const cv::Mat& grey, const Camera& camera,
-                                const std::optional<PosePrior>& prior = std::nullopt);
+                                const std::optional<PosePrior>& prior = std::nullopt,
+                                const std::optional<SensedUp>& up = std::nullopt);
 
   // The same from features that were already extracted (rows of descriptors belong to keypoints).
   Result<Localization> LocalizeFeatures(Features features, const Camera& camera,
-                                        const std::optional<PosePrior>& prior = std::nullopt);
+                                        const std::optional<PosePrior>& prior = std::nullopt,
+                                        const std::optional<SensedUp>& up = std::nullopt);
+
+  // One fix of what several cameras see at once: poses, prior and up are the rig's.  Landmarks that each
+  // recognizes by itself are matched; poses come from those of all of them (generalised P3P), and a camera
+  // that recognizes nothing is searched for what the others' pose puts into its image.  Errors: as Localize,
+  // of any image; InvalidArgument without images or with a pose on the rig that is none.
+  Result<Localization> LocalizeRig(const std::vector<RigImage>& images,
+                                   const std::optional<PosePrior>& prior = std::nullopt,
+                                   const std::optional<SensedUp>& up = std::nullopt);
+  Result<Localization> LocalizeRigFeatures(std::vector<RigFeatures> images,
+                                           const std::optional<PosePrior>& prior = std::nullopt,
+                                           const std::optional<SensedUp>& up = std::nullopt);
 
   // The steps of Localize, for callers that know more than one image (RegionTracker).  The features of an
   // image, with their rays and packed descriptors.  Errors: as Localize.
@@ -53,7 +81,9 @@ class Localizer {
   // Errors: as Localize.
   Status AddFineFeatures(const cv::Mat& grey, int max_num,
                          const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const;
-  Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
+  // What else is known of the moment when it was taken.  Errors: as CheckSensedUp.
+  Status SetUp(const SensedUp& up, Query* query) const;
+  Result<Localization> LocalizeQuery(const Sighting& query, const std::optional<PosePrior>& prior) const;
   // The same, but these landmarks (ascending), of regions that were voted for, are matched before all others.
   Result<Localization> LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const;
   // Localizes among these landmarks (ascending) only, and those of look-alikes that the prior does
@@ -68,46 +98,59 @@ class Localizer {
   const LocalizerOptions& options() const { return options_; }
 
  private:
-  // A set of landmarks to match.
+  // Landmarks to match.
   struct Attempt {
     Scope scope = Scope::kAll;
-    std::vector<LandmarkIdx> landmarks;  // ascending
+    std::vector<std::vector<LandmarkIdx>> landmarks;  // with each image, ascending
+    size_t num_landmarks() const;                     // with all of them together
   };
   struct FollowedUp;
   struct PlaceToTry;
+  static Attempt WithAllImages(Scope scope, std::vector<LandmarkIdx> landmarks, const Sighting& sighting);
   // `best`: what was found before.
-  Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
+  Result<Localization> LocalizeBetter(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                       Localization best) const;
   Status CheckImage(const cv::Mat& grey, const Camera& camera) const;
+  // Errors: InvalidArgument where it is no pose.
+  Status PutOnRig(const Pose& cam_from_rig, Query* query) const;
+  Result<Localization> LocalizeRigQueries(std::vector<Query> queries, const std::optional<PosePrior>& prior,
+                                          const std::optional<SensedUp>& up) const;
+  // The prior of one of its cameras.
+  PosePrior PriorOfImage(const PosePrior& prior, const Query& query) const;
   // The last step of every fix: look-alikes are excluded, and it is put into the given frame.
-  Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
+  Result<Localization> Answer(const Sighting& sighting, const std::optional<PosePrior>& prior,
                               Localization localization) const;
   // And the error of the map's scale is added to its covariance.
   void PutInGivenFrame(Localization* fix) const;
-  Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
+  Result<std::vector<Attempt>> MakeAttempts(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                             std::vector<ImageId>* candidate_ids) const;
-  Result<Localization> Try(const Query& query, const Attempt& attempt) const;
+  Result<Localization> Try(const Sighting& sighting, const Attempt& attempt) const;
   // What a first pose, of these matches, leads to.
-  Result<FollowedUp> FollowUp(const Query& query, const std::vector<Correspondence>& matches,
+  Result<FollowedUp> FollowUp(const Sighting& sighting, const std::vector<Correspondence>& matches,
                               const PoseEstimate& first) const;
-  // What the image shows of what it should there.  `matched`: the landmarks that first poses come from.
-  Result<PlaceEvidence> EvidenceOf(const Query& query, const LandmarkSet& matched,
+  // The landmarks that the images should show at a pose with these inliers, ascending.
+  Result<std::vector<LandmarkIdx>> LandmarksToLookFor(const Sighting& sighting,
+                                                      const std::vector<Correspondence>& inliers,
+                                                      const Pose& rig_from_world) const;
+  // What the images show of what they should there.  `matched`: the landmarks that first poses come from.
+  Result<PlaceEvidence> EvidenceOf(const Sighting& sighting, const LandmarkSet& matched,
                                    const FollowedUp& followed_up) const;
   // The fix of that of these first poses which leads to most, unless one at another place leads to nearly as
   // much.
-  Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
+  Result<Localization> Refine(const Sighting& sighting, const LandmarkSet& matched,
                               const std::vector<Correspondence>& matches,
                               const std::vector<PoseEstimate>& firsts, Localization localization) const;
   // These poses, and where the camera would be in the places that look like theirs, unless the prior excludes
   // it.
-  Result<std::vector<PlaceToTry>> WithLookAlikes(const std::vector<Pose>& poses,
+  Result<std::vector<PlaceToTry>> WithLookAlikes(const Sighting& sighting, const std::vector<Pose>& poses,
                                                  const std::optional<PosePrior>& prior) const;
   // `best`, a fix or one of several places, unless look-alikes of these explain the image nearly as well.
-  Result<Localization> ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+  Result<Localization> ExcludeLookAlikes(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                          Localization best) const;
   // A pose at another place that max_second_pose_ratio as many other matches agree on.
   std::optional<PoseEstimate> SecondPose(const std::vector<PoseMeasurement>& measurements,
-                                         const PoseEstimate& first) const;
+                                         const PoseEstimate& first,
+                                         const std::optional<UpMeasurement>& up) const;
 
   std::shared_ptr<const Map> map_;
   LocalizerOptions options_;
@@ -122,6 +165,9 @@ class QueryFrame {
   QueryFrame(const Localizer& localizer, Features features, const Camera& camera)
       : localizer_(localizer), features_(std::move(features)), camera_(camera) {}
 
+  // Which way was up.  REQUIRES: CheckSensedUp
+  void set_up(const SensedUp& up) { up_ = up; }
+  const std::optional<SensedUp>& up() const { return up_; }
   // The image, as long as not all of its features are known; null after that, and where there is none.
   const cv::Mat* image() const { return grey_ && !query_ ? &*grey_ : nullptr; }
   const Camera& camera() const { return camera_; }
@@ -133,6 +179,7 @@ class QueryFrame {
   std::optional<cv::Mat> grey_;
   Features features_;
   Camera camera_;
+  std::optional<SensedUp> up_;
   std::shared_ptr<const Query> query_;  // with all features
 };
 

@@ -22,6 +22,12 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
        .help = "withhold a fix while a place that looks alike explains the image nearly as well"});
   table.push_back({"min_look_alike_odds", &options->min_look_alike_odds,
                    "a fix must be so many times likelier than the same at a place that looks alike", 1});
+  table.push_back(
+      {.name = "floor_up_sigma_deg",
+       .value = &options->floor_up_sigma_deg,
+       .help = "where up is sensed: how well the map knows which way is up from its floor, degrees",
+       .min = 0.01,
+       .max = 90});
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});

@@ -141,6 +141,9 @@ struct AcceptOptions {
   // direction.  REQUIRES: > 0
   double max_sigma_m = 0.5;
   double max_sigma_deg = 5;
+  // Where up is known (SensedUp): largest angle between where a fix has it and where it was sensed, standard
+  // deviations of both.  REQUIRES: > 0
+  double max_up_sigmas = 4;
   // Largest distance from the nearest survey image, m; 0: any.  REQUIRES: >= 0
   double max_distance_from_survey_m = 5;
   // A second pose at another place that has half this part of the first one's inliers is followed up too; if
@@ -178,6 +181,9 @@ struct LocalizerOptions {
   // (twin wings, bench/drive).  REQUIRES: >= 1
   bool exclude_look_alikes = true;
   double min_look_alike_odds = 100;
+  // How well the map's up is known, degrees per axis: that of its floor, against which a sensed up is held.
+  // REQUIRES: > 0
+  double floor_up_sigma_deg = 2;
   // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
   bool fall_back_to_all = true;
   int fall_back_max_num_landmarks = 200000;

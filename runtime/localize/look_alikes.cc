@@ -14,70 +14,84 @@
 
 namespace cairn {
 
-// A pose, and the survey images near it.
+// A pose of the rig, and the survey images near each of its cameras.
 struct Localizer::PlaceToTry {
   Pose cam_from_world;
-  std::vector<Candidate> near;
+  std::vector<std::vector<Candidate>> near;
 };
 
 Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
-    const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
+    const Sighting& sighting, const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
   std::vector<PlaceToTry> places;
   const auto add = [&](const Pose& pose) -> Status {
-    CAIRN_ASSIGN_OR_RETURN(auto near,
-                           RetrieveByPrior(*map_, {given_from_camera * pose, 0, 0}, options_.retrieve));
-    places.push_back({pose, std::move(near)});
+    PlaceToTry place{pose, {}};
+    for (const Query& query : sighting.images) {
+      CAIRN_ASSIGN_OR_RETURN(
+          auto near,
+          RetrieveByPrior(*map_, PriorOfImage({given_from_camera * pose, 0, 0}, query), options_.retrieve));
+      place.near.push_back(std::move(near));
+    }
+    places.push_back(std::move(place));
     return Ok();
   };
   for (const Pose& pose : poses) CAIRN_RETURN_IF_ERROR(add(pose));
-  std::vector<int32_t> possible;  // by the prior
-  if (prior) {
-    RetrieveOptions retrieve = options_.retrieve;
-    retrieve.max_num_candidates = std::numeric_limits<int>::max();
-    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, *prior, retrieve));
-    possible = ImagesOf(candidates);
-    std::sort(possible.begin(), possible.end());
-  }
   CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
-  for (size_t i = 0; i < poses.size(); ++i) {
-    if (places[i].near.empty()) continue;
-    const int32_t image = places[i].near[0].image;
-    const NodeIdx node = appearance->node_of_image[image];
-    if (node < 0) continue;
-    CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
-    const Pose cam_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
-    for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
-      const int32_t other = appearance->node_images[look_alike.node].front();
-      if (prior && !std::binary_search(possible.begin(), possible.end(), other)) continue;
-      CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(other));
-      const Pose there = cam_from_nearest * other_image->cam_from_world;
-      // Of a place many images look alike.
-      const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
-        return !AreFarApart(place.cam_from_world, there, options_.accept);
-      });
-      if (!is_known) CAIRN_RETURN_IF_ERROR(add(there));
+  for (int k = 0; k < sighting.num_images(); ++k) {
+    const Query& query = sighting.images[k];
+    std::vector<int32_t> possible;  // by the prior
+    if (prior) {
+      RetrieveOptions retrieve = options_.retrieve;
+      retrieve.max_num_candidates = std::numeric_limits<int>::max();
+      CAIRN_ASSIGN_OR_RETURN(const auto candidates,
+                             RetrieveByPrior(*map_, PriorOfImage(*prior, query), retrieve));
+      possible = ImagesOf(candidates);
+      std::sort(possible.begin(), possible.end());
+    }
+    for (size_t i = 0; i < poses.size(); ++i) {
+      if (places[i].near[k].empty()) continue;
+      const int32_t image = places[i].near[k][0].image;
+      const NodeIdx node = appearance->node_of_image[image];
+      if (node < 0) continue;
+      CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
+      const Pose rig_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
+      for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
+        const int32_t other = appearance->node_images[look_alike.node].front();
+        if (prior && !std::binary_search(possible.begin(), possible.end(), other)) continue;
+        CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(other));
+        const Pose there = rig_from_nearest * other_image->cam_from_world;
+        // Of a place many images look alike.
+        const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
+          return !AreFarApart(place.cam_from_world, there, options_.accept);
+        });
+        if (!is_known) CAIRN_RETURN_IF_ERROR(add(there));
+      }
     }
   }
   return places;
 }
 
-Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
+                                                  const std::optional<PosePrior>& prior,
                                                   Localization best) const {
   if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
   const std::vector<Pose> poses =
       best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(poses, prior));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(sighting, poses, prior));
   if (places.size() == poses.size()) return best;
   // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
   // are among them, no match is much better than the next best.
   std::vector<Localization> found;
   bool is_confirmed = true;
   for (size_t i = 0; i < places.size(); ++i) {
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(places[i].near)));
+    Attempt attempt{.scope = Scope::kImages};
+    for (const std::vector<Candidate>& near : places[i].near) {
+      CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(near)));
+      attempt.landmarks.push_back(std::move(landmarks));
+    }
     Localization here;
-    if (!landmarks.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(here, Try(query, {Scope::kImages, std::move(landmarks)}));
+    if (attempt.num_landmarks() > 0) {
+      CAIRN_ASSIGN_OR_RETURN(here, Try(sighting, attempt));
     }
     const bool is_new = i >= poses.size();
     const bool is_here =

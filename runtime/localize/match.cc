@@ -242,47 +242,59 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
   return landmarks;
 }
 
-std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
-                                        const Pose& cam_from_world, const MatchOptions& options) {
-  return GuidedSearch(query, landmarks, cam_from_world, options).Match({0, 0});
+std::vector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
+                                        const Pose& rig_from_world, const MatchOptions& options) {
+  std::vector<Correspondence> matches;
+  for (int image = 0; image < sighting.num_images(); ++image) {
+    const Query& query = sighting.images[image];
+    for (Correspondence match :
+         GuidedSearch(query, landmarks, query.cam_from_rig * rig_from_world, options).Match({0, 0})) {
+      match.image = image;
+      matches.push_back(match);
+    }
+  }
+  return matches;
 }
 
-GuidedMatches MatchGuidedInRounds(const Query& query, const LandmarkSet& landmarks, const PoseEstimate& first,
-                                  const MatchOptions& options, const EstimateOptions& estimate_options,
+GuidedMatches MatchGuidedInRounds(const Sighting& sighting, const LandmarkSet& landmarks,
+                                  const PoseEstimate& first, const MatchOptions& options,
+                                  const EstimateOptions& estimate_options,
                                   const RefineOptions& refine_options) {
-  GuidedMatches best{MatchGuided(query, landmarks, first.cam_from_world, options), first.cam_from_world};
+  GuidedMatches best{MatchGuided(sighting, landmarks, first.cam_from_world, options), first.cam_from_world};
   const bool is_sure = static_cast<int>(first.inliers.size()) >= options.guided_sure_num_inliers;
   Pose pose = first.cam_from_world;
   for (double wider = is_sure ? 1 : options.guided_widest; wider > 1; wider /= 2) {
     MatchOptions wide = options;
     wide.guided_radius_px *= wider;
     const auto estimate =
-        EstimatePose(MakeMeasurements(query, landmarks, MatchGuided(query, landmarks, pose, wide)),
-                     estimate_options, refine_options, kRansacSeed);
+        EstimatePose(MakeMeasurements(sighting, landmarks, MatchGuided(sighting, landmarks, pose, wide)),
+                     estimate_options, refine_options, kRansacSeed, sighting.up);
     if (!estimate) break;
     pose = estimate->cam_from_world;
-    std::vector<Correspondence> matches = MatchGuided(query, landmarks, pose, options);
+    std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, pose, options);
     if (matches.size() > best.matches.size()) best = {std::move(matches), pose};
   }
   for (int round = 1; round < options.guided_max_num_rounds; ++round) {
-    const auto refined =
-        RefinePose(MakeMeasurements(query, landmarks, best.matches), best.cam_from_world, refine_options);
+    const auto refined = RefinePose(MakeMeasurements(sighting, landmarks, best.matches), best.cam_from_world,
+                                    refine_options, sighting.up);
     if (!refined) break;
-    std::vector<Correspondence> matches = MatchGuided(query, landmarks, *refined, options);
+    std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, *refined, options);
     if (matches.size() <= best.matches.size()) break;
     best = {std::move(matches), *refined};
   }
   return best;
 }
 
-double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+double GuidedByChance(const Sighting& sighting, const LandmarkSet& landmarks, const Pose& rig_from_world,
                       const MatchOptions& options) {
   constexpr double kRadii = 4;
-  const GuidedSearch search(query, landmarks, cam_from_world, options);
   double sum = 0;
-  for (const Eigen::Vector2d& aside : {Eigen::Vector2d(kRadii, 0), Eigen::Vector2d(-kRadii, 0),
-                                       Eigen::Vector2d(0, kRadii), Eigen::Vector2d(0, -kRadii)}) {
-    sum += static_cast<double>(search.Match(aside).size());
+  for (const Query& query : sighting.images) {
+    const GuidedSearch search(query, landmarks, query.cam_from_rig * rig_from_world, options);
+    for (const Eigen::Vector2d& aside : {Eigen::Vector2d(kRadii, 0), Eigen::Vector2d(-kRadii, 0),
+                                         Eigen::Vector2d(0, kRadii), Eigen::Vector2d(0, -kRadii)}) {
+      sum += static_cast<double>(search.Match(aside).size());
+    }
   }
   return sum / 4;
 }

@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-// Correspondences between the query and these landmarks, by mutual nearest descriptors and ratio test,
+// Correspondences between an image and these landmarks, by mutual nearest descriptors and ratio test,
 // ascending by keypoint.  REQUIRES: landmarks.packed
 std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
                                            const MatchOptions& options);
@@ -21,15 +21,16 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
 Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
                                                     const MatchOptions& options);
 
-// Correspondences of landmarks with keypoints near their projections at `cam_from_world`: per landmark the
-// keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by keypoint.
-std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
-                                        const Pose& cam_from_world, const MatchOptions& options);
+// Correspondences of landmarks with keypoints near their projections at a pose: per landmark and image the
+// keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by image, then
+// by keypoint.
+std::vector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
+                                        const Pose& rig_from_world, const MatchOptions& options);
 
 // What guided matching found, and the pose at which it looked.
 struct GuidedMatches {
   std::vector<Correspondence> matches;
-  Pose cam_from_world;
+  Pose cam_from_world;  // of a rig: rig_from_world
 };
 
 // A first pose of few matches may be too far off for some landmarks to be found, and what lies near a wrong
@@ -37,13 +38,14 @@ struct GuidedMatches {
 // guided_widest times as far from their projections, and a pose is estimated anew from what is there; then
 // half as far, and so on; the pose at which MatchGuided finds most stays.  Then what it finds refines the
 // pose (RefinePose), and they are looked for again there, as long as that finds more.
-GuidedMatches MatchGuidedInRounds(const Query& query, const LandmarkSet& landmarks, const PoseEstimate& first,
-                                  const MatchOptions& options, const EstimateOptions& estimate_options,
+GuidedMatches MatchGuidedInRounds(const Sighting& sighting, const LandmarkSet& landmarks,
+                                  const PoseEstimate& first, const MatchOptions& options,
+                                  const EstimateOptions& estimate_options,
                                   const RefineOptions& refine_options);
 
 // How many MatchGuided finds where there is nothing to be found: the mean over four ways of looking for each
 // landmark beside its projection, four times as far off as it is looked for at all.
-double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+double GuidedByChance(const Sighting& sighting, const LandmarkSet& landmarks, const Pose& rig_from_world,
                       const MatchOptions& options);
 
 }  // namespace cairn

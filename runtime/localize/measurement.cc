@@ -1,9 +1,11 @@
 #include "runtime/localize/measurement.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/blocks/map_rows.h"
+#include "runtime/localize/localization.h"
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {
@@ -39,6 +41,8 @@ std::vector<std::optional<QueryRay>> RaysOf(const std::vector<Keypoint>& keypoin
   }
   return rays;
 }
+
+bool IsIdentity(const Pose& pose) { return pose.translation.isZero(0) && pose.rotation.vec().isZero(0); }
 
 }  // namespace
 
@@ -104,13 +108,42 @@ bool WasLookedFor(const MapLandmark& landmark, double depth_m, const Query& quer
          landmark.scale_m * query.camera.MeanFocal() >= query.min_scale_px * depth_m;
 }
 
-std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
+Status CheckSensedUp(const SensedUp& up) {
+  const double length = up.direction.norm();
+  if (!std::isfinite(length) || !(length > 0))
+    return MakeError(ErrorCode::kInvalidArgument, "gravity: ({}, {}, {}) is no direction", up.direction.x(),
+                     up.direction.y(), up.direction.z());
+  if (!(up.sigma_deg > 0) || !std::isfinite(up.sigma_deg))
+    return MakeError(ErrorCode::kInvalidArgument, "gravity: sigma of {} degrees; expected more than 0",
+                     up.sigma_deg);
+  return Ok();
+}
+
+int Sighting::num_features() const {
+  size_t num = 0;
+  for (const Query& query : images) num += query.features.keypoints.size();
+  return static_cast<int>(num);
+}
+
+std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
+  std::vector<LandmarkIdx> landmarks;
+  for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+std::vector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
                                               const std::vector<Correspondence>& correspondences) {
   std::vector<PoseMeasurement> measurements;
   measurements.reserve(correspondences.size());
   for (const Correspondence& correspondence : correspondences) {
     const MapLandmark& landmark = landmarks.Find(correspondence.landmark);
-    measurements.push_back({landmark.position, landmark.covariance, *query.rays[correspondence.keypoint]});
+    const Query& query = sighting.images[correspondence.image];
+    PoseMeasurement measurement{landmark.position, landmark.covariance, *query.rays[correspondence.keypoint],
+                                correspondence.image, std::nullopt};
+    if (!IsIdentity(query.cam_from_rig)) measurement.cam_from_rig = query.cam_from_rig;
+    measurements.push_back(std::move(measurement));
   }
   return measurements;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,6 +12,8 @@
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
+#include "core/geometry/minimal_pose.h"
+#include "core/geometry/pose.h"
 #include "runtime/localize/localizer_options.h"
 
 namespace cairn {
@@ -36,6 +39,13 @@ struct QueryRay {
   double sigma_px = 1;
 };
 
+// Up, as a robot's accelerometer says and as the map does, and how well the two agree where a pose is right:
+// standard deviation per axis, rad.
+struct UpMeasurement {
+  KnownDirection up;
+  double sigma_rad = 0;
+};
+
 // What localization needs of a query image.
 struct Query {
   Features features;
@@ -45,6 +55,9 @@ struct Query {
   // Features of smaller scales (sigma, px) were not looked for in all of the image, and what the image should
   // show of them is not missing.
   double min_scale_px = 0;
+  // These in frames of the map's cameras (MapHead::camera_from_given).
+  std::optional<UpMeasurement> up;
+  Pose cam_from_rig;  // of a camera of a rig, whose frame `up` is in then
 };
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options);
 // More features of the same image, behind those that the query has.  They are found by guided matching
@@ -55,20 +68,43 @@ void AddFeatures(const Features& features, const MeasurementOptions& options, Qu
 // Of a landmark whose size is not known only where all scales were looked for.
 bool WasLookedFor(const MapLandmark& landmark, double depth_m, const Query& query);
 
+// What one fix is made of: an image, or those that the cameras of a rig take at once.  Poses are the rig's;
+// with one image, its camera's.  The images outlive it.
+struct Sighting {
+  std::span<const Query> images;
+  std::optional<UpMeasurement> up;
+
+  Sighting(const Query& query) : images(&query, 1), up(query.up) {}  // NOLINT: an image is a sighting
+  // REQUIRES: at least one; what the first knows of up counts
+  explicit Sighting(std::span<const Query> of_rig) : images(of_rig), up(of_rig.front().up) {}
+  int num_images() const { return static_cast<int>(images.size()); }
+  int num_features() const;
+};
+
 // A keypoint that shows a landmark.
 struct Correspondence {
   KeypointIdx keypoint = 0;
   LandmarkIdx landmark = 0;
+  int image = 0;  // of the sighting
 };
+
+// Their landmarks, ascending, each once.
+std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences);
 
 // A correspondence with everything that pose estimation needs.
 struct PoseMeasurement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();             // landmark, world frame, metres
   Eigen::Matrix3d point_covariance = Eigen::Matrix3d::Zero();  // m^2
   QueryRay ray;
+  int image = 0;
+  std::optional<Pose> cam_from_rig;  // none: the rig's frame is the camera's
+
+  Eigen::Vector3d InCamera(const Eigen::Vector3d& in_rig) const {
+    return cam_from_rig ? *cam_from_rig * in_rig : in_rig;
+  }
 };
 // REQUIRES: the keypoints have rays, the landmarks are in the set
-std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
+std::vector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
                                               const std::vector<Correspondence>& correspondences);
 
 }  // namespace cairn

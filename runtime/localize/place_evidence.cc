@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "core/base/quantiles.h"
 #include "core/blocks/map_blocks.h"
@@ -24,25 +25,11 @@ int CellOf(const Eigen::Vector2d& pixel, const Camera& camera, int num_cells) {
   return cell(pixel.y(), camera.height) * num_cells + cell(pixel.x(), camera.width);
 }
 
-}  // namespace
-
-Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const Pose& cam_from_world,
-                                      const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
-                                      int num_matched, int num_cells) {
-  PlaceEvidence evidence{.num_matched = num_matched};
-  if (found.empty()) return evidence;
-  std::vector<double> depths;
-  std::vector<LandmarkIdx> found_idx;
-  for (const Correspondence& match : found) {
-    depths.push_back(DepthOfScale(query.camera, cam_from_world * landmarks.Find(match.landmark).position));
-    found_idx.push_back(match.landmark);
-  }
-  std::sort(found_idx.begin(), found_idx.end());
-  const ViewOptions one_view;
-  const double radius_m = one_view.same_view_ratio * UpperMedian(std::move(depths));
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
-                         NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews));
-  evidence.squared_distance = near.front().squared_distance;
+// What an image should show from there, by the survey images near.
+Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const Pose& cam_from_world,
+                                      const std::vector<NearView>& near,
+                                      const std::vector<LandmarkIdx>& found_idx, int num_cells) {
+  PlaceEvidence evidence{.squared_distance = near.front().squared_distance};
   std::map<LandmarkIdx, double> seen;  // sum of the weights of the images that see it
   double sum = 0;
   for (const NearView& view : near) {
@@ -67,8 +54,49 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const 
     cells_expected.insert(cell);
     if (std::binary_search(found_idx.begin(), found_idx.end(), expected->idx[k])) cells_found.insert(cell);
   }
-  evidence.num_cells_expected = static_cast<int>(cells_expected.size());
-  evidence.num_cells_found = static_cast<int>(cells_found.size());
+  evidence.num_cells_expected = static_cast<double>(cells_expected.size());
+  evidence.num_cells_found = static_cast<double>(cells_found.size());
+  return evidence;
+}
+
+}  // namespace
+
+Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, const Pose& rig_from_world,
+                                      const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
+                                      int num_matched, int num_cells) {
+  PlaceEvidence evidence{.num_matched = num_matched};
+  if (found.empty()) return evidence;
+  std::vector<double> depths;
+  std::vector<std::vector<LandmarkIdx>> found_idx(sighting.images.size());  // by each image
+  for (const Correspondence& match : found) {
+    const Query& query = sighting.images[match.image];
+    const Eigen::Vector3d in_rig = rig_from_world * landmarks.Find(match.landmark).position;
+    depths.push_back(DepthOfScale(query.camera, query.cam_from_rig * in_rig));
+    found_idx[match.image].push_back(match.landmark);
+  }
+  const ViewOptions one_view;
+  const double radius_m = one_view.same_view_ratio * UpperMedian(std::move(depths));
+  std::vector<PlaceEvidence> of_images;
+  for (int i = 0; i < sighting.num_images(); ++i) {
+    const Query& query = sighting.images[i];
+    const Pose cam_from_world = query.cam_from_rig * rig_from_world;
+    CAIRN_ASSIGN_OR_RETURN(
+        const std::vector<NearView> near,
+        NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews));
+    std::sort(found_idx[i].begin(), found_idx[i].end());
+    CAIRN_ASSIGN_OR_RETURN(PlaceEvidence of_image,
+                           EvidenceOfImage(map, query, cam_from_world, near, found_idx[i], num_cells));
+    of_images.push_back(of_image);
+  }
+  evidence.squared_distance = of_images.front().squared_distance;
+  for (const PlaceEvidence& of_image : of_images)
+    evidence.squared_distance = std::min(evidence.squared_distance, of_image.squared_distance);
+  for (const PlaceEvidence& of_image : of_images) {
+    const double weight = (1 + evidence.squared_distance) / (1 + of_image.squared_distance);
+    evidence.num_expected += weight * of_image.num_expected;
+    evidence.num_cells_expected += weight * of_image.num_cells_expected;
+    evidence.num_cells_found += weight * of_image.num_cells_found;
+  }
   return evidence;
 }
 
@@ -81,8 +109,7 @@ double OddsOfPlace(const PlaceEvidence& evidence) {
   constexpr double kMostOdds = 3000;
   const double found_ratio = std::max(kFewestMatched, static_cast<double>(evidence.num_matched)) /
                              std::max(kFewestExpected, evidence.num_expected);
-  const double cells_ratio =
-      static_cast<double>(evidence.num_cells_found) / std::max(1, evidence.num_cells_expected);
+  const double cells_ratio = evidence.num_cells_found / std::max(1.0, evidence.num_cells_expected);
   return std::min(std::exp(kBias + kFoundWeight * std::log(found_ratio) + kCellsWeight * cells_ratio),
                   kMostOdds / std::pow(1 + evidence.squared_distance, 1.5));
 }

@@ -19,17 +19,18 @@ struct PlaceEvidence {
   double num_expected = 0;
   int num_matched = 0;  // matches, found without the pose, that agree with it
   // Square of the distance to the nearest survey image, in views (a tenth of the depth, 15 degrees): far from
-  // all of them nobody knows what should be seen.
+  // all of them nobody knows what should be seen.  Of a rig, that of the camera that is nearest to one; what
+  // others should show counts the less the farther off they are.
   double squared_distance = 0;
-  // Cells of the image in which landmarks are expected, and those of them with one that was found.
-  int num_cells_expected = 0;
-  int num_cells_found = 0;
+  // Cells of the images in which landmarks are expected, and those of them with one that was found.
+  double num_cells_expected = 0;
+  double num_cells_found = 0;
 };
 
-// `found`: what guided matching found at the pose.  `num_matched`: as in PlaceEvidence.  `num_cells`: per
-// side of the image.  Reads the nearest survey images only.  Errors: as Map::Landmarks.
+// `found`: what guided matching found at the pose, ascending by image.  `num_matched`: as in PlaceEvidence.
+// `num_cells`: per side of the image.  Reads the nearest survey images only.  Errors: as Map::Landmarks.
 // REQUIRES: num_cells >= 1; the landmarks found are in the set
-Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const Pose& cam_from_world,
+Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, const Pose& rig_from_world,
                                       const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
                                       int num_matched, int num_cells);
 

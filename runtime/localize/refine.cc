@@ -33,22 +33,25 @@ struct Linearised {
 };
 
 std::optional<Eigen::Vector2d> Residual(const PoseMeasurement& measurement, const Pose& pose) {
-  const Eigen::Vector3d x = pose * measurement.point;
+  const Eigen::Vector3d x = measurement.InCamera(pose * measurement.point);
   if (!(x.z() > kMinDepthM)) return std::nullopt;
   return measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray);
 }
 
 std::optional<Linearised> Linearise(const PoseMeasurement& measurement, const Pose& pose) {
-  const Eigen::Vector3d x = pose * measurement.point;
+  const Eigen::Vector3d in_rig = pose * measurement.point;
+  const Eigen::Vector3d x = measurement.InCamera(in_rig);
   if (!(x.z() > kMinDepthM)) return std::nullopt;
-  Eigen::Matrix<double, 2, 3> pixel_from_point;  // d residual / d point in the camera frame
+  Eigen::Matrix<double, 2, 3>
+      pixel_from_point;  // d residual / d point, in the camera's frame, then the rig's
   const double inverse_z = 1 / x.z();
   pixel_from_point << inverse_z, 0, -x.x() * inverse_z * inverse_z, 0, inverse_z,
       -x.y() * inverse_z * inverse_z;
   pixel_from_point = measurement.ray.pixel_from_ray * pixel_from_point;
+  if (measurement.cam_from_rig) pixel_from_point *= measurement.cam_from_rig->rotation.toRotationMatrix();
   Linearised linearised;
   linearised.residual = measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray);
-  linearised.jacobian.leftCols<3>() = -pixel_from_point * CrossMatrix(x);
+  linearised.jacobian.leftCols<3>() = -pixel_from_point * CrossMatrix(in_rig);
   linearised.jacobian.rightCols<3>() = pixel_from_point;
   const Eigen::Matrix<double, 2, 3> pixel_from_landmark = pixel_from_point * pose.rotation.toRotationMatrix();
   linearised.covariance =
@@ -69,10 +72,43 @@ double Cauchy(double squared, double scale) {
   return std::isinf(scale) ? squared : scale * scale * std::log1p(squared / (scale * scale));
 }
 
+// Up's error at a pose: the angle between where it is and where it was sensed, rad, as two angles about axes
+// at right angles to the latter, and their Jacobian over the perturbation's rotation.
+struct UpError {
+  Eigen::Vector2d angles;
+  Eigen::Matrix<double, 2, 3> jacobian;
+};
+
+UpError LineariseUp(const KnownDirection& up, const Pose& pose) {
+  const Eigen::Vector3d at_pose = pose.rotation * up.in_world;
+  const Eigen::Matrix<double, 2, 3> basis = TangentBasis(up.in_rig).transpose();
+  const Eigen::Vector2d sines = basis * at_pose;
+  const double sine = sines.norm();
+  const double angle = std::atan2(sine, up.in_rig.dot(at_pose));
+  return {sine > 1e-12 ? Eigen::Vector2d(sines * (angle / sine)) : sines, -basis * CrossMatrix(at_pose)};
+}
+
+// Up, with its variance in units of the keypoints' noise, which is known only in the course of refinement.
+struct WeightedUp {
+  std::optional<UpMeasurement> up;
+  double variance_unit = 1;
+
+  double Information() const { return variance_unit / (up->sigma_rad * up->sigma_rad); }
+  double Cost(const Pose& pose) const {
+    return up ? Information() * LineariseUp(up->up, pose).angles.squaredNorm() : 0;
+  }
+};
+
 // `scale`: of the robust loss; infinity for plain least squares.
 NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
-                                     double scale) {
+                                     double scale, const WeightedUp& up) {
   NormalEquations equations;
+  if (up.up) {
+    const UpError error = LineariseUp(up.up->up, pose);
+    equations.matrix.topLeftCorner<3, 3>() = up.Information() * error.jacobian.transpose() * error.jacobian;
+    equations.gradient.head<3>() = up.Information() * error.jacobian.transpose() * error.angles;
+    equations.cost = up.Information() * error.angles.squaredNorm();
+  }
   equations.informations.assign(measurements.size(), Eigen::Matrix2d::Zero());
   for (size_t i = 0; i < measurements.size(); ++i) {
     const auto linearised = Linearise(measurements[i], pose);
@@ -93,8 +129,8 @@ NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measure
 // The cost at another pose with the same weights of the measurements; infinite when a point went behind
 // the camera.
 double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEquations& equations,
-              const Pose& pose, double scale) {
-  double cost = 0;
+              const Pose& pose, double scale, const WeightedUp& up) {
+  double cost = up.Cost(pose);
   for (size_t i = 0; i < measurements.size(); ++i) {
     if (equations.informations[i].isZero(0)) continue;
     const auto residual = Residual(measurements[i], pose);
@@ -105,10 +141,10 @@ double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEqua
 }
 
 std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measurements, Pose pose,
-                                       double scale, int max_num_iterations) {
+                                       double scale, int max_num_iterations, const WeightedUp& up) {
   double damping = 1e-6;
   for (int iteration = 0; iteration < max_num_iterations; ++iteration) {
-    const NormalEquations equations = BuildNormalEquations(measurements, pose, scale);
+    const NormalEquations equations = BuildNormalEquations(measurements, pose, scale, up);
     if (equations.num_points < 3) return std::nullopt;
     bool improved = false;
     double step_norm = 0;
@@ -119,7 +155,7 @@ std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measu
       const Vector6d step = -factors.solve(equations.gradient);
       if (factors.info() != Eigen::Success || !factors.isPositive() || !step.allFinite()) return std::nullopt;
       const Pose candidate = Perturb(pose, step);
-      if (CostAt(measurements, equations, candidate, scale) <= equations.cost) {
+      if (CostAt(measurements, equations, candidate, scale, up) <= equations.cost) {
         pose = candidate;
         step_norm = step.norm();
         damping = std::max(1e-9, damping * 0.1);
@@ -239,26 +275,37 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to) {
 }
 
 std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
-                               const RefineOptions& options) {
-  return LevenbergMarquardt(measurements, initial, options.robust_scale, options.max_num_refine_iterations);
+                               const RefineOptions& options, const std::optional<UpMeasurement>& up) {
+  return LevenbergMarquardt(measurements, initial, options.robust_scale, options.max_num_refine_iterations,
+                            {up});
+}
+
+double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world) {
+  return LineariseUp(up.up, rig_from_world).angles.norm() / up.sigma_rad;
 }
 
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
-                                                    const Pose& initial, const RefineOptions& options) {
+                                                    const Pose& initial, const RefineOptions& options,
+                                                    const std::optional<UpMeasurement>& up) {
   constexpr int kMinNumInliers = 5;  // 10 residuals for 6 parameters
   if (static_cast<int>(measurements.size()) < kMinNumInliers) return std::nullopt;
-  std::optional<Pose> pose = RefinePose(measurements, initial, options);
+  std::optional<Pose> pose = RefinePose(measurements, initial, options, up);
   if (!pose) return std::nullopt;
   RefinedPose refined;
+  const double truncation = TruncationFactor(options.inlier_chi_square);
+  // By how much keypoints' errors are larger than stated, those that they share among them.
+  const auto variance_unit = [&](size_t num_inliers) {
+    const double dispersion = 1 + 0.5 * static_cast<double>(num_inliers) * options.keypoint_correlation;
+    return options.covariance_scale * dispersion * truncation * refined.noise_variance;
+  };
   std::vector<double> squares = WhitenedSquares(measurements, *pose);
   // The loss's scale is in units of the noise, which is known only now.
   refined.noise_variance = VarianceFromMedian(squares);
   pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
-                            options.max_num_refine_iterations);
+                            options.max_num_refine_iterations, {up, variance_unit(measurements.size())});
   if (!pose) return std::nullopt;
   squares = WhitenedSquares(measurements, *pose);
   refined.noise_variance = VarianceFromMedian(squares);
-  const double truncation = TruncationFactor(options.inlier_chi_square);
   for (int round = 0; round < 4; ++round) {
     std::vector<int> inliers;
     for (size_t i = 0; i < squares.size(); ++i) {
@@ -269,7 +316,8 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     if (round > 0 && inliers == refined.inliers) break;
     refined.inliers = std::move(inliers);
     pose = LevenbergMarquardt(Select(measurements, refined.inliers), *pose,
-                              std::numeric_limits<double>::infinity(), options.max_num_refine_iterations);
+                              std::numeric_limits<double>::infinity(), options.max_num_refine_iterations,
+                              {up, variance_unit(refined.inliers.size())});
     if (!pose) return std::nullopt;
     squares = WhitenedSquares(measurements, *pose);
     double sum = 0;
@@ -278,16 +326,14 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
         std::max(1e-6, truncation * VarianceFromSum(sum, static_cast<int>(refined.inliers.size())));
     if (!std::isfinite(refined.noise_variance)) return std::nullopt;
   }
+  const double unit = variance_unit(refined.inliers.size());
   const NormalEquations equations = BuildNormalEquations(Select(measurements, refined.inliers), *pose,
-                                                         std::numeric_limits<double>::infinity());
+                                                         std::numeric_limits<double>::infinity(), {up, unit});
   const Eigen::LDLT<Matrix6d> factors(equations.matrix);
   if (factors.info() != Eigen::Success || !factors.isPositive() || factors.vectorD().minCoeff() <= 0)
     return std::nullopt;
   refined.cam_from_world = *pose;
-  refined.covariance = factors.solve(Matrix6d::Identity());
-  const double dispersion =
-      1 + 0.5 * static_cast<double>(refined.inliers.size()) * options.keypoint_correlation;
-  refined.covariance *= options.covariance_scale * dispersion * truncation * refined.noise_variance;
+  refined.covariance = unit * factors.solve(Matrix6d::Identity());
   refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
   AddSystematic(options, &refined.covariance);
   if (!refined.covariance.allFinite()) return std::nullopt;

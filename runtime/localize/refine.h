@@ -21,11 +21,15 @@ Pose Perturb(const Pose& cam_from_world, const Vector6d& xi);
 Vector6d PerturbationBetween(const Pose& from, const Pose& to);
 
 // Minimises the robust sum over measurements of rho(r' S^-1 r): r = reprojection error in px, S = keypoint's
-// variance + landmark's covariance projected into the image, rho = Cauchy's loss.  Levenberg-Marquardt on 6
-// parameters.  Nothing when fewer than 3 points lie in front of the camera or the normal equations
-// are singular.
+// variance + landmark's covariance projected into the image, rho = Cauchy's loss; plus the square of up's
+// error where up is known.  Levenberg-Marquardt on 6 parameters.  Nothing when fewer than 3 points lie in
+// front of their camera or the normal equations are singular.
 std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
-                               const RefineOptions& options);
+                               const RefineOptions& options,
+                               const std::optional<UpMeasurement>& up = std::nullopt);
+
+// How far up is, where a pose has it, from where it was sensed, standard deviations.
+double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world);
 
 // A pose with its uncertainty.
 struct RefinedPose {
@@ -42,7 +46,8 @@ struct RefinedPose {
 // Refines robustly, then by least squares over the inliers, whose limit follows the noise found.
 // Nothing when fewer than 5 inliers are left or the geometry is degenerate.
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
-                                                    const Pose& initial, const RefineOptions& options);
+                                                    const Pose& initial, const RefineOptions& options,
+                                                    const std::optional<UpMeasurement>& up = std::nullopt);
 
 // Of a covariance's worst direction.
 double LargestSigma(const Eigen::Matrix3d& covariance);

@@ -88,7 +88,8 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
 
 Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const cv::Mat& grey,
                                       const Camera& camera, const std::vector<LandmarkIdx>& expected,
-                                      const PosePrior& prior, const ExpectedFeaturesOptions& options) {
+                                      const PosePrior& prior, const ExpectedFeaturesOptions& options,
+                                      const std::optional<SensedUp>& up) {
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(expected, false));
   const auto num_of_unknown_size =
       std::count_if(landmarks->landmarks.begin(), landmarks->landmarks.end(),
@@ -99,6 +100,7 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                                                num_of_unknown_size, expected.size())};
   }
   CAIRN_ASSIGN_OR_RETURN(Query query, localizer.CoarseQueryFromImage(grey, camera));
+  if (up) CAIRN_RETURN_IF_ERROR(localizer.SetUp(*up, &query));
   const int num_features = static_cast<int>(query.features.keypoints.size());
   if (num_features < localizer.options().accept.min_num_features) {
     return Localization{.reason = NoFix::kTooFewFeatures,

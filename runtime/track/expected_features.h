@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -17,6 +18,7 @@ namespace cairn {
 // more exact.  No fix where half of the landmarks' sizes are not known.  Errors: as Localizer::Localize.
 Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const cv::Mat& grey,
                                       const Camera& camera, const std::vector<LandmarkIdx>& expected,
-                                      const PosePrior& prior, const ExpectedFeaturesOptions& options);
+                                      const PosePrior& prior, const ExpectedFeaturesOptions& options,
+                                      const std::optional<SensedUp>& up = std::nullopt);
 
 }  // namespace cairn

@@ -100,9 +100,10 @@ Result<Localization> RegionTracker::TrackFeatures(Features features, const Camer
 
 Result<Localization> RegionTracker::TrackFrame(QueryFrame* frame) {
   return WithoutExceptions("track", [&]() -> Result<Localization> {
+    if (up_) frame->set_up(*std::exchange(up_, std::nullopt));
     const std::optional<PosePrior> prior = Prediction();
     if (prior && frame->image() != nullptr && options_.features.map_guided) {
-      CAIRN_ASSIGN_OR_RETURN(const auto found, TrackExpected(*frame->image(), frame->camera(), *prior));
+      CAIRN_ASSIGN_OR_RETURN(const auto found, TrackExpected(*frame, *prior));
       if (found) return *found;
     }
     CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
@@ -122,6 +123,12 @@ Status RegionTracker::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
   CAIRN_RETURN_IF_ERROR(CheckFloorMotion({way_m, turn_left_rad}, head));
   was_told_ = true;
   if (motion_) motion_->Add(FloorMotion{way_m, turn_left_rad}, head.floor_from_world, options_.wheels);
+  return Ok();
+}
+
+Status RegionTracker::SenseUp(const SensedUp& up) {
+  CAIRN_RETURN_IF_ERROR(CheckSensedUp(up));
+  up_ = up;
   return Ok();
 }
 
@@ -157,12 +164,14 @@ std::optional<UncertainPose> RegionTracker::Believed() const {
                        TransformCovariance(given_from_camera, believed.covariance)};
 }
 
-Result<std::optional<Localization>> RegionTracker::TrackExpected(const cv::Mat& grey, const Camera& camera,
+Result<std::optional<Localization>> RegionTracker::TrackExpected(const QueryFrame& frame,
                                                                  const PosePrior& prior) {
+  const Camera& camera = frame.camera();
   CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
   CAIRN_ASSIGN_OR_RETURN(const auto expected, ExpectedLandmarks(prior, AsFound(map_->head(), camera)));
-  CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeExpected(*map_, expecting_localizer_, grey, camera,
-                                                              expected, prior, options_.features));
+  CAIRN_ASSIGN_OR_RETURN(Localization found,
+                         LocalizeExpected(*map_, expecting_localizer_, *frame.image(), camera, expected,
+                                          prior, options_.features, frame.up()));
   if (!found.has_fix() || !Agrees(found, prior)) return std::optional<Localization>();
   Update(found);
   return std::optional(std::move(found));

@@ -67,6 +67,8 @@ class RegionTracker {
   // metre).
   Status Move(const UncertainPose& next_from_last);
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
+  // Which way is up at the next frame.  Errors: as CheckSensedUp.
+  Status SenseUp(const SensedUp& up);
 
   // The next frame; scope kTrack: found by the prediction.  The same frames, the same results.
   // Errors: as Localizer::Localize; the state is then as before.  No exception leaves it.
@@ -84,8 +86,7 @@ class RegionTracker {
  private:
   Result<Localization> TrackQuery(const Query& query, const std::optional<PosePrior>& prior);
   // Found by the prediction, without the features of all of the image; nothing if not.
-  Result<std::optional<Localization>> TrackExpected(const cv::Mat& grey, const Camera& camera,
-                                                    const PosePrior& prior);
+  Result<std::optional<Localization>> TrackExpected(const QueryFrame& frame, const PosePrior& prior);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
   Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
   // The visible landmarks vote for their regions.
@@ -104,7 +105,8 @@ class RegionTracker {
   RegionIdx region_ = -1;
   // Since the last fix.  These are of the map's camera frame.
   std::optional<MotionSinceFix> motion_;
-  bool was_told_ = false;     // how it moved since the last frame
+  bool was_told_ = false;  // how it moved since the last frame
+  std::optional<SensedUp> up_;
   int num_frames_since_ = 0;  // the last fix
 };
 

@@ -27,11 +27,11 @@ TEST(SureTracker, WithoutAProbabilityItIsARegionTracker) {
     EXPECT_EQ(found.probability, expected.probability);
   }
   EXPECT_TRUE(every.Move({1, 0}, 0).ok());
-  for (const Status& status : {every.Elapse(1), every.SenseUp({0, -1, 0}, 1)}) {
-    ASSERT_FALSE(status.ok());
-    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_THAT(status.error().message, testing::HasSubstr("min_place_probability"));
-  }
+  EXPECT_TRUE(every.SenseUp({0, -1, 0}, 1).ok());
+  const Status status = every.Elapse(1);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, testing::HasSubstr("min_place_probability"));
 }
 
 TEST(SureTracker, OdometryMovesItsTrackerAndItsBelief) {
@@ -111,7 +111,7 @@ TEST(SureTracker, WhatGravityContradictsIsNotPublished) {
     ASSERT_TRUE(upright.SenseUp({0, -1, 0}, 2).ok());
     EXPECT_TRUE(Show(&upright, OnDrive(i), i).has_fix());
     ASSERT_TRUE(tilted.SenseUp({0.7, -0.7, 0}, 2).ok());
-    EXPECT_EQ(Show(&tilted, OnDrive(i), i).reason, NoFix::kImprobable);
+    EXPECT_FALSE(Show(&tilted, OnDrive(i), i).has_fix());
   }
   EXPECT_GT(tilted.belief()->elsewhere(), 0.7);
   EXPECT_FALSE(tilted.SenseUp({0, 0, 0}, 2).ok());

@@ -189,9 +189,9 @@ TEST(Localizer, AStatedCameraIsTheOneThatTheSurveyFound) {
 }
 
 TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {
-  Camera camera;
-  camera.width = 640;
-  camera.height = 480;
+  Query query;
+  query.camera.width = 640;
+  query.camera.height = 480;
   Random random(4);
   std::vector<PoseMeasurement> measurements(100);
   for (PoseMeasurement& measurement : measurements) {
@@ -200,13 +200,13 @@ TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {
     measurement.ray.pixel_from_ray = 480 * Eigen::Matrix2d::Identity();
   }
   const double disc = M_PI * 36 / (640 * 480);
-  EXPECT_NEAR(ChanceOfInlier(measurements, Pose(), 6, camera), disc, disc);
+  EXPECT_NEAR(ChanceOfInlier(measurements, Pose(), 6, query), disc, disc);
   Pose far;  // from 1000 m everything is one point, and so are the keypoints that show it
   far.translation.z() = 1000;
   for (PoseMeasurement& measurement : measurements)
     measurement.ray.ray = (far * measurement.point).hnormalized();
-  EXPECT_GT(ChanceOfInlier(measurements, far, 6, camera), 0.9);
-  EXPECT_NEAR(ChanceOfInlier({}, Pose(), 6, camera), disc, 1e-12);
+  EXPECT_GT(ChanceOfInlier(measurements, far, 6, query), 0.9);
+  EXPECT_NEAR(ChanceOfInlier({}, Pose(), 6, query), disc, 1e-12);
 }
 
 TEST(Log10ChancePoses, FollowsTheDefinition) {

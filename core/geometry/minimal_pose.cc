@@ -1,0 +1,243 @@
+#include "core/geometry/minimal_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <Eigen/Dense>
+
+namespace cairn {
+namespace {
+
+constexpr int kMaxDegree = 8;
+using Polynomial = Eigen::Matrix<double, kMaxDegree + 1, 1>;  // coefficients, the constant first
+
+Polynomial MakePolynomial(double constant, double linear = 0, double quadratic = 0) {
+  Polynomial polynomial = Polynomial::Zero();
+  polynomial.head<3>() << constant, linear, quadratic;
+  return polynomial;
+}
+
+// REQUIRES: the product's degree is at most kMaxDegree
+Polynomial Times(const Polynomial& a, const Polynomial& b) {
+  Polynomial product = Polynomial::Zero();
+  for (int i = 0; i <= kMaxDegree; ++i) product.tail(kMaxDegree + 1 - i) += a[i] * b.head(kMaxDegree + 1 - i);
+  return product;
+}
+
+double ValueAt(const Polynomial& polynomial, int degree, double x) {
+  double value = polynomial[degree];
+  for (int i = degree - 1; i >= 0; --i) value = value * x + polynomial[i];
+  return value;
+}
+
+struct Roots {
+  std::array<double, kMaxDegree + 2> x;
+  int num = 0;
+  void Add(double root) { x[num++] = root; }
+};
+
+// The root between two places where the values' signs differ: Newton's steps, halves where one leads out.
+double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, int degree, double low,
+                   double high) {
+  const bool is_rising = ValueAt(polynomial, degree, low) < 0;
+  double x = 0.5 * (low + high);
+  constexpr int kMaxSteps = 100;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const double value = ValueAt(polynomial, degree, x);
+    if (value == 0) break;
+    ((value < 0) == is_rising ? low : high) = x;
+    double next = x - value / ValueAt(derivative, degree - 1, x);
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (std::abs(next - x) <= 1e-15 * std::abs(x)) break;
+    x = next;
+  }
+  return x;
+}
+
+// Where it changes its sign between two places, ascending: once at most between two of its derivative's
+// roots.
+Roots RootsBetween(const Polynomial& polynomial, int degree, double low, double high) {
+  Roots roots;
+  if (degree < 1) return roots;
+  Polynomial derivative = Polynomial::Zero();
+  for (int i = 1; i <= degree; ++i) derivative[i - 1] = i * polynomial[i];
+  Roots ends = RootsBetween(derivative, degree - 1, low, high);
+  ends.Add(high);
+  for (int i = 0; i < ends.num; ++i) {
+    const double from = i == 0 ? low : ends.x[i - 1];
+    if ((ValueAt(polynomial, degree, from) < 0) != (ValueAt(polynomial, degree, ends.x[i]) < 0))
+      roots.Add(RootBetween(polynomial, derivative, degree, from, ends.x[i]));
+  }
+  return roots;
+}
+
+// |(o1 + x d1) - (o2 + y d2)|^2 - distance^2 as a polynomial of both depths:
+// x^2 + y^2 + xy x y + x1 x + y1 y + constant.
+struct DistanceEquation {
+  double xy = 0, x1 = 0, y1 = 0, constant = 0;
+
+  DistanceEquation(const RigRay& a, const RigRay& b, double squared_distance) {
+    const Eigen::Vector3d offset = a.origin - b.origin;
+    xy = -2 * a.direction.dot(b.direction);
+    x1 = 2 * a.direction.dot(offset);
+    y1 = -2 * b.direction.dot(offset);
+    constant = offset.squaredNorm() - squared_distance;
+  }
+  double At(double x, double y) const { return x * x + y * y + xy * x * y + x1 * x + y1 * y + constant; }
+  double DerivativeX(double x, double y) const { return 2 * x + xy * y + x1; }
+  double DerivativeY(double x, double y) const { return 2 * y + xy * x + y1; }
+};
+
+// The depths of three rays whose ends are so far apart.
+class ThreeDepths {
+ public:
+  ThreeDepths(const std::array<RigRay, 3>& rays, const std::array<Eigen::Vector3d, 3>& points)
+      : xy_(rays[0], rays[1], (points[0] - points[1]).squaredNorm()),
+        xz_(rays[0], rays[2], (points[0] - points[2]).squaredNorm()),
+        yz_(rays[1], rays[2], (points[1] - points[2]).squaredNorm()) {}
+
+  std::vector<Eigen::Vector3d> Solve() const {
+    // With x fixed: y^2 + b1 y + c1 = 0, z^2 + b2 z + c2 = 0.
+    const Polynomial b1 = MakePolynomial(xy_.y1, xy_.xy), c1 = MakePolynomial(xy_.constant, xy_.x1, 1);
+    const Polynomial b2 = MakePolynomial(xz_.y1, xz_.xy), c2 = MakePolynomial(xz_.constant, xz_.x1, 1);
+    // The third with y^2 and z^2 from these: (A z + B) y + (C z + D) = 0.
+    const double A = yz_.xy;
+    const Polynomial B = MakePolynomial(yz_.x1) - b1, C = MakePolynomial(yz_.y1) - b2;
+    const Polynomial D = MakePolynomial(yz_.constant) - c1 - c2;
+    // y from there into the first: n2 z^2 + n1 z + n0 = 0, and z^2 from the second: E z + F = 0.
+    const Polynomial n2 = Times(C, C) - A * Times(b1, C) + A * A * c1;
+    const Polynomial n1 = 2 * Times(C, D) - Times(b1, A * D + Times(B, C)) + 2 * A * Times(c1, B);
+    const Polynomial n0 = Times(D, D) - Times(b1, Times(B, D)) + Times(c1, Times(B, B));
+    const Polynomial E = n1 - Times(b2, n2), F = n0 - Times(c2, n2);
+    // And z from there into the second.
+    const Polynomial resultant = Times(F, F) - Times(b2, Times(E, F)) + Times(c2, Times(E, E));
+
+    int degree = kMaxDegree;
+    const double largest = resultant.cwiseAbs().maxCoeff();
+    constexpr double kNothing = 1e-14;
+    while (degree > 0 && std::abs(resultant[degree]) <= kNothing * largest) --degree;
+    if (degree == 0) return {};
+    // [Cauchy] no root is larger.
+    const double bound = 1 + largest / std::abs(resultant[degree]);
+    const Roots roots = RootsBetween(resultant, degree, 0, bound);
+    std::vector<Eigen::Vector3d> depths;
+    for (int i = 0; i < roots.num; ++i) {
+      const double x = roots.x[i];
+      const double z = -ValueAt(F, kMaxDegree, x) / ValueAt(E, kMaxDegree, x);
+      const double y = -(ValueAt(C, 1, x) * z + ValueAt(D, 2, x)) / (A * z + ValueAt(B, 1, x));
+      if (const auto polished = Polished({x, y, z})) depths.push_back(*polished);
+    }
+    return depths;
+  }
+
+ private:
+  // By Newton's steps on the three distances; nothing where they lead nowhere, or behind an origin.
+  std::optional<Eigen::Vector3d> Polished(Eigen::Vector3d depths) const {
+    constexpr int kNumSteps = 5;
+    Eigen::Vector3d errors;
+    for (int step = 0;; ++step) {
+      const double x = depths.x(), y = depths.y(), z = depths.z();
+      errors << xy_.At(x, y), xz_.At(x, z), yz_.At(y, z);
+      if (step == kNumSteps) break;
+      Eigen::Matrix3d jacobian;
+      jacobian << xy_.DerivativeX(x, y), xy_.DerivativeY(x, y), 0,  //
+          xz_.DerivativeX(x, z), 0, xz_.DerivativeY(x, z),          //
+          0, yz_.DerivativeX(y, z), yz_.DerivativeY(y, z);
+      depths -= jacobian.partialPivLu().solve(errors);
+    }
+    constexpr double kLargestError = 1e-6;
+    const bool is_solved = errors.cwiseAbs().maxCoeff() <= kLargestError * (1 + depths.squaredNorm());
+    if (!is_solved || !(depths.minCoeff() > 0)) return std::nullopt;  // NaN: neither
+    return depths;
+  }
+
+  DistanceEquation xy_, xz_, yz_;
+};
+
+// Axes of the triangle of three points: columns.
+Eigen::Matrix3d Axes(const std::array<Eigen::Vector3d, 3>& points) {
+  Eigen::Matrix3d axes;
+  axes.col(0) = (points[1] - points[0]).normalized();
+  axes.col(2) = axes.col(0).cross(points[2] - points[0]).normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return axes;
+}
+
+Eigen::Matrix3d LevelFrom(const Eigen::Vector3d& up) {
+  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
+}  // namespace
+
+std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
+                                     const std::array<Eigen::Vector3d, 3>& points) {
+  // In units of the triangle, so that coefficients are near 1.
+  const double unit = std::max((points[1] - points[0]).norm(), (points[2] - points[0]).norm());
+  if (!(unit > 0) || !std::isfinite(unit)) return {};
+  std::array<RigRay, 3> scaled_rays = rays;
+  std::array<Eigen::Vector3d, 3> scaled_points;
+  for (int i = 0; i < 3; ++i) {
+    scaled_rays[i].origin = (rays[i].origin - rays[0].origin) / unit;
+    scaled_points[i] = (points[i] - points[0]) / unit;
+  }
+  const Eigen::Matrix3d world_axes = Axes(scaled_points);
+  if (!world_axes.allFinite() || world_axes.col(2).isZero()) return {};
+  std::vector<Pose> poses;
+  for (const Eigen::Vector3d& depths : ThreeDepths(scaled_rays, scaled_points).Solve()) {
+    std::array<Eigen::Vector3d, 3> in_rig;
+    for (int i = 0; i < 3; ++i) in_rig[i] = scaled_rays[i].origin + depths[i] * scaled_rays[i].direction;
+    const Eigen::Matrix3d rotation = Axes(in_rig) * world_axes.transpose();
+    if (!rotation.allFinite()) continue;
+    Pose pose;
+    pose.rotation = Eigen::Quaterniond(rotation).normalized();
+    pose.translation = rays[0].origin + unit * in_rig[0] - pose.rotation * points[0];
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
+                                   const std::array<Eigen::Vector3d, 2>& points, const KnownDirection& up) {
+  // In level frames, z up, only the heading is open.
+  const Eigen::Matrix3d level_from_rig = LevelFrom(up.in_rig), level_from_world = LevelFrom(up.in_world);
+  std::array<Eigen::Vector3d, 2> d;
+  for (int i = 0; i < 2; ++i) d[i] = level_from_rig * rays[i].direction;
+  const Eigen::Vector3d origin = level_from_rig * (rays[0].origin - rays[1].origin);
+  const Eigen::Vector3d apart = level_from_world * (points[0] - points[1]);
+  // Heights: origin.z + x d0.z - y d1.z = apart.z gives one depth from the other, the better one.
+  const bool solve_first = std::abs(d[0].z()) >= std::abs(d[1].z());
+  const Eigen::Vector3d& solved = solve_first ? d[0] : d[1];
+  const Eigen::Vector3d& free = solve_first ? d[1] : d[0];
+  constexpr double kLevel = 1e-9;
+  if (!(std::abs(solved.z()) > kLevel)) return {};
+  const double sign = solve_first ? 1 : -1;  // of the solved one
+  const double constant = sign * (apart.z() - origin.z()) / solved.z();
+  const double slope = free.z() / solved.z();
+  // Between the two points over the floor: a + depth b, as long as it is in the map.
+  const Eigen::Vector2d a = origin.head<2>() + sign * constant * solved.head<2>();
+  const Eigen::Vector2d b = sign * (slope * solved.head<2>() - free.head<2>());
+  const double quadratic = b.squaredNorm(), half_linear = a.dot(b);
+  const double discriminant =
+      half_linear * half_linear - quadratic * (a.squaredNorm() - apart.head<2>().squaredNorm());
+  if (!(quadratic > 0) || !(discriminant >= 0)) return {};
+  std::vector<Pose> poses;
+  for (const double root : {-std::sqrt(discriminant), std::sqrt(discriminant)}) {
+    const double free_depth = (root - half_linear) / quadratic;
+    const double solved_depth = constant + slope * free_depth;
+    if (!(free_depth > 0) || !(solved_depth > 0)) continue;
+    const Eigen::Vector2d in_rig = a + free_depth * b;
+    const double heading = std::atan2(apart.y(), apart.x()) - std::atan2(in_rig.y(), in_rig.x());
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()));
+    Pose pose;
+    pose.rotation =
+        Eigen::Quaterniond(level_from_rig.transpose() * turn.toRotationMatrix() * level_from_world)
+            .normalized();
+    const double depth = solve_first ? solved_depth : free_depth;
+    pose.translation = rays[0].origin + depth * rays[0].direction - pose.rotation * points[0];
+    if (pose.translation.allFinite()) poses.push_back(pose);
+  }
+  return poses;
+}
+
+}  // namespace cairn
