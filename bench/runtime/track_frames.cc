@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <limits>
 #include <map>
 #include <vector>
@@ -16,46 +15,23 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 
+#include "bench/runtime/fix_figures.h"
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
-#include "runtime/localize/refine.h"
 #include "runtime/track/region_tracker.h"
 
 namespace cairn {
 namespace {
 
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-double QuantileOf(std::vector<double> values, double part) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(part * static_cast<double>(values.size() - 1))];
-}
-
-struct Figures {
+struct Figures : FixFigures {
   std::vector<double> ms, ms_of_opencv;  // of each frame; and its ratio to OpenCV's SIFT
-  int num_fixes = 0, num_wrong = 0;
-  double num_features = 0, num_inliers = 0;
-  std::vector<double> errors_m, errors_deg, errors_squared;
   std::map<std::string, int> scopes;
 
   void Add(const Localization& found, const Pose& truth, double frame_seconds, double opencv_seconds) {
+    FixFigures::Add(found, truth);
     ms.push_back(1000 * frame_seconds);
     ms_of_opencv.push_back(frame_seconds / opencv_seconds);
-    num_features += found.num_features;
-    if (!found.has_fix()) return;
-    ++num_fixes;
-    num_inliers += found.num_inliers;
-    errors_m.push_back(CenterErrorM(found.cam_from_world, truth));
-    errors_deg.push_back(RotationErrorDeg(found.cam_from_world, truth));
-    const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
-    errors_squared.push_back(error.dot(found.covariance.ldlt().solve(error)));
-    num_wrong += errors_m.back() > 0.5 || errors_deg.back() > 10;
-    ++scopes[ScopeName(found.scope)];
+    if (found.has_fix()) ++scopes[ScopeName(found.scope)];
   }
 
   void Print(const std::string& name) const {

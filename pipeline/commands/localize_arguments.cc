@@ -37,6 +37,14 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"place_reach_links"}, "is for images without odometry; leave it out"));
   }
+  if (arguments.gravity_path.empty()) {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"floor_up_sigma_deg", "max_up_sigmas", "place_map_up_sigma_deg"},
+        "is for gravity; give --gravity, or leave it out"));
+    if (arguments.gravity_sigma_deg > 0)
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
+  }
   if (arguments.sure_options.min_place_probability == 0 && arguments.period_s > 0)
     return MakeError(ErrorCode::kInvalidArgument,
                      "--period is for --min-place-probability; give it, 0.9 say, or leave this out");
@@ -64,6 +72,20 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
                                                       "is for frames without odometry; leave it out");
 }
 
+// Refuses what does not go with the cameras of a rig.
+Status CheckForRig(const LocalizeArguments& arguments) {
+  if (arguments.rig_path.empty()) return Ok();
+  const char* refused = arguments.is_sequence           ? "--sequence follows one camera"
+                        : arguments.estimator != "pnp"  ? "--estimator: a visual map is asked by one camera"
+                        : !arguments.log_folder.empty() ? "--log keeps frames of one camera"
+                        : !arguments.camera.empty()
+                            ? "--camera is one camera, of images that may be of several"
+                            : nullptr;
+  if (refused == nullptr) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "{}, and --rig is of several; leave one of them out",
+                   refused);
+}
+
 // Refuses what an atlas of many maps has no use for, or a single map.
 Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
   if (!is_atlas) {
@@ -75,7 +97,10 @@ Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
                         : arguments.is_sequence         ? "--sequence: frames are followed in one map"
                         : arguments.estimator != "pnp"  ? "--estimator: visual maps are asked one by one"
                         : !arguments.log_folder.empty() ? "--log: frames are logged for one map"
-                                                        : nullptr;
+                        : !arguments.rig_path.empty()   ? "--rig: a rig is localized in one map"
+                        : !arguments.gravity_path.empty()
+                            ? "--gravity: each map of an atlas has an up of its own"
+                            : nullptr;
   if (refused == nullptr) return Ok();
   return MakeError(ErrorCode::kInvalidArgument,
                    "{}; leave it out, or give the map in which the image turns out to be", refused);
@@ -86,6 +111,11 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
                      "--estimator both");
+  }
+  if (arguments.estimator == "visual-map" && !arguments.gravity_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--gravity is for poses in space, and --estimator visual-map finds places on the floor; "
+                     "use --estimator both");
   }
   if (arguments.estimator == "visual-map" && !arguments.log_folder.empty()) {
     return MakeError(
@@ -106,6 +136,7 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
 Status CheckLocalizeArguments(const LocalizeArguments& arguments, bool is_atlas) {
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
   CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
+  CAIRN_RETURN_IF_ERROR(CheckForRig(arguments));
   return CheckForAtlas(arguments, is_atlas);
 }
 

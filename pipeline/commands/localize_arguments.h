@@ -26,6 +26,9 @@ struct LocalizeArguments {
   bool is_sequence = false;
   std::string odometry_path;
   double period_s = 0;  // 0: not given
+  std::string gravity_path;
+  double gravity_sigma_deg = 0;  // 0: not given
+  std::string rig_path;
   std::string estimator = "pnp";
   std::string log_folder;
   double log_mb_per_day = 0;  // 0: the default

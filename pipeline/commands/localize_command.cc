@@ -16,6 +16,7 @@
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/image_list.h"
+#include "core/colmap/rig_config.h"
 #include "pipeline/commands/in_atlas.h"
 #include "pipeline/commands/localization_json.h"
 #include "pipeline/commands/localize_arguments.h"
@@ -29,6 +30,12 @@
 
 namespace cairn::pipeline {
 namespace {
+
+// An image, or with --rig the reference camera's, and which way was up at it.
+struct Asked {
+  std::string image;
+  std::optional<SensedUp> up;
+};
 
 // An image's answer.
 struct Answer {
@@ -80,6 +87,13 @@ struct Trackers {
     });
   }
 
+  // Which way is up there.
+  Status SenseUp(const std::optional<SensedUp>& up, QueryFrame* frame) {
+    if (!up) return Ok();
+    frame->set_up(*up);
+    return in_space ? in_space->SenseUp(up->direction, up->sigma_deg) : Ok();
+  }
+
   // Where odometry has a camera that was not found.
   std::optional<UncertainPose> Believed(const Result<Localization>& found) const {
     const bool has_fix = found.ok() && found->has_fix();
@@ -88,16 +102,17 @@ struct Trackers {
 };
 
 // By the visual map and, with --estimator both, by PnP too.
-Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>& map, const VisualMap& visual,
+Answer LocateByViews(const Asked& asked, const std::shared_ptr<const Map>& map, const VisualMap& visual,
                      const CameraChoice& cameras, const LocalizeArguments& arguments, Trackers* trackers) {
-  Answer answer{.image = image};
+  Answer answer{.image = asked.image};
   const auto locate = [&]() -> Result<TrackedVisualPose> {
-    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(image));
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(asked.image));
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     const Localizer localizer(map, arguments.options);
     answer.frame.emplace(localizer, grey, camera);
+    CAIRN_RETURN_IF_ERROR(trackers->SenseUp(asked.up, &*answer.frame));
     CAIRN_ASSIGN_OR_RETURN(const Query* query, answer.frame->WithAllFeatures());
     if (trackers->in_space) {
       CAIRN_ASSIGN_OR_RETURN(answer.localization, trackers->in_space->TrackFrame(&*answer.frame));
@@ -123,16 +138,30 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
   return answer;
 }
 
-Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>& map,
-                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
-  Answer answer{.image = image};
+// What the cameras of a rig see.
+Answer LocalizeRigImages(const Asked& asked, const std::vector<RigCamera>& rig,
+                         const std::shared_ptr<const Map>& map, const CameraChoice& cameras,
+                         const LocalizeArguments& arguments) {
+  Answer answer{.image = asked.image};
   answer.localization = [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<RigImage> images, ReadRigImages(asked.image, rig, cameras));
+    answer.camera_id = images.front().camera.camera_id;
+    return Localizer(map, arguments.options).LocalizeRig(images, std::nullopt, asked.up);
+  }();
+  return answer;
+}
+
+Answer LocalizeImage(const Asked& asked, const std::shared_ptr<const Map>& map, const CameraChoice& cameras,
+                     const LocalizeArguments& arguments) {
+  Answer answer{.image = asked.image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     Localizer localizer(map, arguments.options);
-    if (arguments.log_folder.empty()) return localizer.Localize(grey, camera);
+    if (arguments.log_folder.empty()) return localizer.Localize(grey, camera, std::nullopt, asked.up);
     answer.frame.emplace(localizer, grey, camera);
+    if (asked.up) answer.frame->set_up(*asked.up);
     CAIRN_ASSIGN_OR_RETURN(const Query* query, answer.frame->WithAllFeatures());
     return localizer.LocalizeQuery(*query, std::nullopt);
   }();
@@ -140,19 +169,19 @@ Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>&
 }
 
 // The same for the next frame of a sequence.
-Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& map,
-                  const CameraChoice& cameras, const LocalizeArguments& arguments, Trackers* trackers) {
-  Answer answer{.image = image};
-  SureTracker* tracker = &*trackers->in_space;
+Answer TrackImage(const Asked& asked, const std::shared_ptr<const Map>& map, const CameraChoice& cameras,
+                  const LocalizeArguments& arguments, Trackers* trackers) {
+  Answer answer{.image = asked.image};
   answer.localization = [&]() -> Result<Localization> {
-    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(image));
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(asked.image));
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
-    if (arguments.log_folder.empty()) return tracker->Track(grey, camera);
     answer.frame.emplace(Localizer(map, arguments.options), grey, camera);
-    return tracker->TrackFrame(&*answer.frame);
+    CAIRN_RETURN_IF_ERROR(trackers->SenseUp(asked.up, &*answer.frame));
+    return trackers->in_space->TrackFrame(&*answer.frame);
   }();
+  if (arguments.log_folder.empty()) answer.frame.reset();
   answer.believed = trackers->Believed(answer.localization);
   return answer;
 }
@@ -242,14 +271,30 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   int num_images = 0, num_failed = 0, num_places = 0;
   CAIRN_ASSIGN_OR_RETURN(Trackers trackers, Trackers::Make(arguments, map));
   CAIRN_ASSIGN_OR_RETURN(std::optional<RobotLog> log, OpenLog(arguments, *map));
+  std::optional<Gravity> gravity;
+  if (!arguments.gravity_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path, arguments.gravity_sigma_deg));
+  }
+  std::vector<RigCamera> rig;
+  if (!arguments.rig_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(rig, ReadRigConfig(arguments.rig_path));
+  }
   const size_t batch_size =
       arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
+    std::vector<Asked> asked;
+    for (const std::string& image : batch) {
+      asked.push_back({image, std::nullopt});
+      if (gravity) {
+        CAIRN_ASSIGN_OR_RETURN(asked.back().up, gravity->Next(image));
+      }
+    }
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
-      answers[i] = visual ? LocateByViews(batch[i], map, *visual, cameras, arguments, &trackers)
-                   : arguments.is_sequence ? TrackImage(batch[i], map, cameras, arguments, &trackers)
-                                           : LocalizeImage(batch[i], map, cameras, arguments);
+      answers[i] = visual         ? LocateByViews(asked[i], map, *visual, cameras, arguments, &trackers)
+                   : !rig.empty() ? LocalizeRigImages(asked[i], rig, map, cameras, arguments)
+                   : arguments.is_sequence ? TrackImage(asked[i], map, cameras, arguments, &trackers)
+                                           : LocalizeImage(asked[i], map, cameras, arguments);
     });
     for (Answer& answer : answers) {
       *environment.out << JsonText(AnswerJson(answer, arguments)) << "\n" << std::flush;
@@ -279,7 +324,10 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
     spdlog::info("{} of {} images localized", poses.size(), num_images);
   if (visual) spdlog::info("{} of {} images localized by the visual map", num_places, num_images);
   if (log) spdlog::info("{} frames were added to the log {}", log->num_kept(), arguments.log_folder);
-  if (!first_error) return trackers.odometry ? trackers.odometry->CheckAllRead() : Ok();
+  if (!first_error) {
+    if (gravity) CAIRN_RETURN_IF_ERROR(gravity->CheckAllRead());
+    return trackers.odometry ? trackers.odometry->CheckAllRead() : Ok();
+  }
   return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
                    num_images, first_error->message);
 }
@@ -311,6 +359,23 @@ Command LocalizeCommand() {
                      "With --sequence: a line for each image, how the camera moved over the floor since the "
                      "one before: metres ahead, metres to the left, degrees turned to the left; frames "
                      "without a fix then say where it is by that (believed)")
+                .Type("FILE");
+            parser
+                .Add("--gravity", arguments->gravity_path,
+                     "A line for each image, which way was up: a direction in the camera's frame (with --rig "
+                     "the rig's), to the right, down and ahead, of any length; poses then come from two "
+                     "landmarks, not three, and none tilts the camera")
+                .Type("FILE");
+            parser
+                .Add("--gravity-sigma-deg", arguments->gravity_sigma_deg,
+                     "Standard deviation of gravity's direction, degrees [2]")
+                .Range(1e-3, 90.0)
+                .Type("DEG");
+            parser
+                .Add("--rig", arguments->rig_path,
+                     "COLMAP's rig_config.json: the images are of the rig's reference camera, those that its "
+                     "other cameras took at the same time have the same names behind other prefixes, and a "
+                     "pose is the rig's, from all of them")
                 .Type("FILE");
             parser
                 .Add("--period", arguments->period_s,
@@ -346,9 +411,6 @@ Command LocalizeCommand() {
                   DescribeOptions(&arguments->atlas_options)}) {
               options.insert(options.end(), more.begin(), more.end());
             }
-            // Gravity comes through the libraries alone.
-            std::erase_if(options,
-                          [](const Option& option) { return option.name == "place_map_up_sigma_deg"; });
             arguments->option_arguments.Add(
                 parser, options,
                 {"max_num_features", "max_image_side_px", "min_num_inliers", "max_sigma_m", "max_sigma_deg",

@@ -59,8 +59,10 @@ Status Odometry::MoveToNext(const std::string& image,
   return file_.is_first() ? Ok() : move({step[0], step[1]}, RadFromDeg(step[2]));
 }
 
-Result<Gravity> Gravity::Read(const std::string& path) {
+Result<Gravity> Gravity::Read(const std::string& path, double sigma_deg) {
+  constexpr double kUsualSigmaDeg = 2;
   Gravity gravity;
+  gravity.sigma_deg_ = sigma_deg > 0 ? sigma_deg : kUsualSigmaDeg;
   CAIRN_ASSIGN_OR_RETURN(
       gravity.file_,
       SensorFile::Read(path,
@@ -69,9 +71,12 @@ Result<Gravity> Gravity::Read(const std::string& path) {
   return gravity;
 }
 
-Result<Eigen::Vector3d> Gravity::Next(const std::string& image) {
-  CAIRN_ASSIGN_OR_RETURN(const auto up, file_.Next(image));
-  return Eigen::Vector3d(up[0], up[1], up[2]);
+Result<SensedUp> Gravity::Next(const std::string& image) {
+  CAIRN_ASSIGN_OR_RETURN(const auto numbers, file_.Next(image));
+  const SensedUp up{{numbers[0], numbers[1], numbers[2]}, sigma_deg_};
+  if (const Status status = CheckSensedUp(up); !status.ok())
+    return MakeError(status.error().code, "{}: {}", image, status.error().message);
+  return up;
 }
 
 }  // namespace cairn::pipeline

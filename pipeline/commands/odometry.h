@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/base/error.h"
+#include "runtime/localize/localization.h"
 
 namespace cairn::pipeline {
 
@@ -52,13 +53,15 @@ class Odometry {
 // length).
 class Gravity {
  public:
-  // Errors: as SensorFile.
-  static Result<Gravity> Read(const std::string& path);
-  Result<Eigen::Vector3d> Next(const std::string& image);
+  // `sigma_deg`: of all of them; 0: what is usual, 2.  Errors: as SensorFile.
+  static Result<Gravity> Read(const std::string& path, double sigma_deg);
+  // Errors: as SensorFile, and as CheckSensedUp, naming the image.
+  Result<SensedUp> Next(const std::string& image);
   Status CheckAllRead() const { return file_.CheckAllRead(); }
 
  private:
   SensorFile file_;
+  double sigma_deg_ = 0;
 };
 
 }  // namespace cairn::pipeline

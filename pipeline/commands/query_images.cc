@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/text.h"
+#include "core/capture/image_file.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
 
@@ -47,6 +48,25 @@ Result<std::optional<Camera>> CameraChoice::GivenForImage(int width, int height)
   }
   if (found != nullptr) return std::optional<Camera>(*found);
   return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
+}
+
+Result<std::vector<RigImage>> ReadRigImages(const std::string& image, const std::vector<RigCamera>& rig,
+                                            const CameraChoice& cameras) {
+  std::vector<RigImage> images;
+  for (size_t i = 0; i < rig.size(); ++i) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string name, NameInRig(rig, i, image));
+    RigImage of_camera{.cam_from_rig = rig[i].cam_from_rig};
+    CAIRN_ASSIGN_OR_RETURN(of_camera.grey, ReadGreyImage(name));
+    if (rig[i].camera) {
+      of_camera.camera = *rig[i].camera;
+      of_camera.camera.width = of_camera.grey.cols;
+      of_camera.camera.height = of_camera.grey.rows;
+    } else {
+      CAIRN_ASSIGN_OR_RETURN(of_camera.camera, cameras.ForImage(of_camera.grey.cols, of_camera.grey.rows));
+    }
+    images.push_back(std::move(of_camera));
+  }
+  return images;
 }
 
 Result<ImageNames> ImageNames::Make(std::vector<std::string> names, const std::string& list_path) {

@@ -9,6 +9,8 @@
 #include "core/base/error.h"
 #include "core/base/ids.h"
 #include "core/camera/camera.h"
+#include "core/colmap/rig_config.h"
+#include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
 
 namespace cairn::pipeline {
@@ -35,6 +37,11 @@ class CameraChoice {
   std::optional<Camera> camera_;
   std::map<CameraId, Camera> cameras_;
 };
+
+// The images that the cameras of a rig took at the same time as the reference camera took this one, each with
+// its camera: the rig's file's, else that of its size.  Errors: those of NameInRig, ReadGreyImage, ForImage.
+Result<std::vector<RigImage>> ReadRigImages(const std::string& image, const std::vector<RigCamera>& rig,
+                                            const CameraChoice& cameras);
 
 // Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
 class ImageNames {

@@ -107,8 +107,9 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
         {"reach_links"}, "is for images without odometry; leave it out"));
   }
   if (arguments.gravity_path.empty()) {
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"map_up_sigma_deg"}, "is for gravity; give --gravity, or leave it out"));
+    CAIRN_RETURN_IF_ERROR(
+        arguments.option_arguments.RefuseGiven({"map_up_sigma_deg", "floor_up_sigma_deg", "max_up_sigmas"},
+                                               "is for gravity; give --gravity, or leave it out"));
     if (arguments.gravity_sigma_deg > 0)
       return MakeError(ErrorCode::kInvalidArgument,
                        "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
@@ -124,7 +125,7 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
   }
   std::optional<Gravity> gravity;
   if (!arguments.gravity_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path));
+    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path, arguments.gravity_sigma_deg));
   }
   CAIRN_ASSIGN_OR_RETURN(PlaceBelief belief, PlaceBelief::Make(map, arguments.options));
   const Localizer localizer(map, arguments.localizer_options);
@@ -140,16 +141,16 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
             return belief.Move(way_m, turn_left_rad);
           }));
     }
+    std::optional<SensedUp> up;
     if (gravity) {
-      CAIRN_ASSIGN_OR_RETURN(const Eigen::Vector3d up, gravity->Next(image));
-      constexpr double kUsualSigmaDeg = 2;
-      const double sigma_deg = arguments.gravity_sigma_deg > 0 ? arguments.gravity_sigma_deg : kUsualSigmaDeg;
-      CAIRN_RETURN_IF_ERROR(belief.SenseUp(up, sigma_deg));
+      CAIRN_ASSIGN_OR_RETURN(up, gravity->Next(image));
+      CAIRN_RETURN_IF_ERROR(belief.SenseUp(up->direction, up->sigma_deg));
     }
     CAIRN_RETURN_IF_ERROR(belief.Elapse(arguments.period_s));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
-    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
+    CAIRN_ASSIGN_OR_RETURN(Query query, localizer.QueryFromImage(grey, camera));
+    if (up) CAIRN_RETURN_IF_ERROR(localizer.SetUp(*up, &query));
     Step step{.image = image};
     CAIRN_ASSIGN_OR_RETURN(step.found, localizer.LocalizeQuery(query, std::nullopt));
     CAIRN_RETURN_IF_ERROR(belief.See(query, step.found));

@@ -19,33 +19,53 @@ constexpr int kMinNumInliers = 4;
 // A pose that has up farther than so many standard deviations from where it was sensed is none.
 constexpr double kMaxUpSigmas = 4;
 
-// Squared reprojection error in px, at most `limit`.
-double TruncatedError(const PoseMeasurement& measurement, const Eigen::Matrix3d& rotation,
-                      const Eigen::Vector3d& translation, double limit) {
-  const Eigen::Vector3d x = measurement.InCamera(rotation * measurement.point + translation);
-  if (!(x.z() > 0)) return limit;
-  const double error =
-      (measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray)).squaredNorm();
-  return error < limit ? error : limit;  // NaN: limit
-}
+// The cameras of a rig at one of its poses.
+class CamerasAt {
+ public:
+  explicit CamerasAt(const Pose& rig_from_world) : rig_from_world_(rig_from_world) {}
+
+  // Squared reprojection error in px, at most `limit`.  Fast where measurements of one image follow each
+  // other.
+  double TruncatedError(const PoseMeasurement& measurement, double limit) {
+    if (measurement.image != image_) {
+      image_ = measurement.image;
+      Turn(measurement.cam_from_rig ? *measurement.cam_from_rig * rig_from_world_ : rig_from_world_);
+    }
+    const Eigen::Vector3d x = rotation_ * measurement.point + translation_;
+    if (!(x.z() > 0)) return limit;
+    const double error =
+        (measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray)).squaredNorm();
+    return error < limit ? error : limit;  // NaN: limit
+  }
+
+ private:
+  void Turn(const Pose& cam_from_world) {
+    rotation_ = cam_from_world.rotation.toRotationMatrix();
+    translation_ = cam_from_world.translation;
+  }
+
+  Pose rig_from_world_;
+  int image_ = -1;  // whose camera's these are:
+  Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
+};
 
 // Sum of truncated errors; stops early once it exceeds `best`.
 double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit, double best) {
-  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  CamerasAt cameras(pose);
   double sum = 0;
   for (const PoseMeasurement& measurement : measurements) {
-    sum += TruncatedError(measurement, rotation, pose.translation, limit);
+    sum += cameras.TruncatedError(measurement, limit);
     if (sum > best) break;
   }
   return sum;
 }
 
 std::vector<int> Inliers(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit) {
-  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  CamerasAt cameras(pose);
   std::vector<int> inliers;
   for (size_t i = 0; i < measurements.size(); ++i) {
-    if (TruncatedError(measurements[i], rotation, pose.translation, limit) < limit)
-      inliers.push_back(static_cast<int>(i));
+    if (cameras.TruncatedError(measurements[i], limit) < limit) inliers.push_back(static_cast<int>(i));
   }
   return inliers;
 }

@@ -20,6 +20,18 @@ struct Localizer::PlaceToTry {
   std::vector<std::vector<Candidate>> near;
 };
 
+namespace {
+
+// Where a place looks like that of a pose.
+struct LookAlikePose {
+  Pose rig_from_world;
+  size_t of_pose = 0;
+  int last_camera = 0;  // that found it so
+  double weight = 0;    // landmarks that those cameras see which do
+};
+
+}  // namespace
+
 Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
     const Sighting& sighting, const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
@@ -37,6 +49,8 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
   };
   for (const Pose& pose : poses) CAIRN_RETURN_IF_ERROR(add(pose));
   CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
+  std::vector<LookAlikePose> found;
+  std::vector<double> weights(poses.size(), 0);  // of all cameras, at each
   for (int k = 0; k < sighting.num_images(); ++k) {
     const Query& query = sighting.images[k];
     std::vector<int32_t> possible;  // by the prior
@@ -51,9 +65,11 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
     for (size_t i = 0; i < poses.size(); ++i) {
       if (places[i].near[k].empty()) continue;
       const int32_t image = places[i].near[k][0].image;
+      CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
+      const auto weight = static_cast<double>(nearest->landmarks.size());
+      weights[i] += weight;
       const NodeIdx node = appearance->node_of_image[image];
       if (node < 0) continue;
-      CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
       const Pose rig_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
       for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
         const int32_t other = appearance->node_images[look_alike.node].front();
@@ -61,12 +77,25 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
         CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(other));
         const Pose there = rig_from_nearest * other_image->cam_from_world;
         // Of a place many images look alike.
-        const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
-          return !AreFarApart(place.cam_from_world, there, options_.accept);
+        const auto known = std::find_if(found.begin(), found.end(), [&](const LookAlikePose& place) {
+          return place.of_pose == i && !AreFarApart(place.rig_from_world, there, options_.accept);
         });
-        if (!is_known) CAIRN_RETURN_IF_ERROR(add(there));
+        if (known == found.end()) {
+          found.push_back({there, i, k, weight});
+        } else if (known->last_camera != k) {
+          known->last_camera = k;
+          known->weight += weight;
+        }
       }
     }
+  }
+  for (const LookAlikePose& there : found) {
+    // Where most of what a rig sees looks otherwise, what is left is not nearly as much.
+    if (2 * there.weight < weights[there.of_pose]) continue;
+    const bool is_known = std::any_of(places.begin(), places.end(), [&](const PlaceToTry& place) {
+      return !AreFarApart(place.cam_from_world, there.rig_from_world, options_.accept);
+    });
+    if (!is_known) CAIRN_RETURN_IF_ERROR(add(there.rig_from_world));
   }
   return places;
 }

@@ -78,6 +78,11 @@ OptionTable DescribeOptions(SimulateOptions* o) {
        1},
       {"image_noise", &o->image_noise, "Standard deviation of grey noise in survey images, of 255", 0, 50},
       {"jpeg_quality", &o->jpeg_quality, "Quality of the JPEG files", 1, 100},
+      {"rig_num_cameras", &o->rig_num_cameras,
+       "Cameras of the rig that takes the queries and the images of a driven survey, evenly turned about an "
+       "upright axis: camera k's images are in a folder camK",
+       1, 16},
+      {"rig_radius_m", &o->rig_radius_m, "Distance of a rig's cameras from its axis, metres", 0, 2},
       {"num_queries", &o->num_queries, "Held-out images at free poses", 0, 1000000},
       {.name = "query_headings",
        .value = &o->query_headings,
@@ -97,6 +102,7 @@ OptionTable DescribeOptions(SimulateOptions* o) {
   AddCondition({"survey", {"driven"}}, {"step_m", "max_turn_deg"}, &table);
   AddCondition({"camera_model", {"EQUIRECTANGULAR"}}, {"panorama_width_px"}, &table);
   AddCondition({"camera_model", {"PINHOLE", "OPENCV_FISHEYE"}}, {"num_headings"}, &table);
+  AddCondition({"rig_num_cameras", {"not 1"}}, {"rig_radius_m"}, &table);
   AddCondition({"twin_wings", {"true"}}, {"back_corridor", "num_different_panels"}, &table);
   return table;
 }

@@ -112,6 +112,10 @@ struct SimulateOptions {
   double light_ratio = 1;
   // Of all image files.  REQUIRES: in [1, 100]
   int jpeg_quality = 95;
+  // Cameras of the rig that takes the queries and the images of a driven survey, evenly turned about an
+  // upright axis, rig_radius_m from it; the first looks ahead.  REQUIRES: in [1, 16] and [0, 2]
+  int rig_num_cameras = 1;
+  double rig_radius_m = 0.1;
 
   // --- The queries: free poses off the lattice, held out
   // REQUIRES: in [0, 1000000]

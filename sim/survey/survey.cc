@@ -217,6 +217,39 @@ Camera MakeFisheye(const SimulateOptions& options) {
   return camera;
 }
 
+// The first is the rig's origin.
+std::vector<Pose> CamerasOnRig(const SimulateOptions& options) {
+  std::vector<Pose> cams_from_rig;
+  Pose first_from_axis;
+  for (int i = 0; i < options.rig_num_cameras; ++i) {
+    Pose cam_from_axis;
+    cam_from_axis.rotation =
+        Eigen::AngleAxisd(2 * std::numbers::pi * i / options.rig_num_cameras, Eigen::Vector3d::UnitY());
+    cam_from_axis.translation = {0, 0, -options.rig_radius_m};
+    if (i == 0) first_from_axis = cam_from_axis;
+    cams_from_rig.push_back(cam_from_axis * first_from_axis.Inverse());
+  }
+  return cams_from_rig;
+}
+
+// Each image, as the first camera's, becomes those of all cameras, one camera after the other.
+std::vector<PlannedImage> TakenByRig(const std::vector<PlannedImage>& images,
+                                     const std::vector<Pose>& cams_from_rig) {
+  std::vector<PlannedImage> taken;
+  for (size_t camera = 0; camera < cams_from_rig.size(); ++camera) {
+    const Pose& cam_from_rig = cams_from_rig[camera];
+    for (PlannedImage image : images) {
+      image.name = RigFolder(static_cast<int>(camera)) + image.name;
+      image.cam_from_world = cam_from_rig * image.cam_from_world;
+      image.stated_cam_from_world = cam_from_rig * image.stated_cam_from_world;
+      image.turn = cam_from_rig.rotation * image.turn;
+      image.way = cam_from_rig.rotation * image.way;
+      taken.push_back(std::move(image));
+    }
+  }
+  return taken;
+}
+
 }  // namespace
 
 Pose MakePose(const Eigen::Vector3d& centre, double heading_rad, double pitch_rad, double roll_rad) {
@@ -248,6 +281,8 @@ Camera MakeQueryCamera(const SimulateOptions& options) {
   return camera;
 }
 
+std::string RigFolder(int camera) { return fmt::format("cam{}/", camera); }
+
 Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& options, uint64_t seed) {
   CAIRN_RETURN_IF_ERROR(CheckSimulateOptions(options));
   const double least_extent = std::min(options.width_m, options.depth_m);
@@ -263,6 +298,11 @@ Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& optio
   std::vector<double> headings;  // of a driven survey's stations
   CAIRN_RETURN_IF_ERROR(AddSurveyImages(building, options, seed, &headings, &survey));
   CAIRN_RETURN_IF_ERROR(AddQueries(building, options, seed, headings, &survey));
+  survey.cams_from_rig = CamerasOnRig(options);
+  if (options.rig_num_cameras > 1) {
+    survey.queries = TakenByRig(survey.queries, survey.cams_from_rig);
+    if (options.survey == "driven") survey.images = TakenByRig(survey.images, survey.cams_from_rig);
+  }
   return survey;
 }
 

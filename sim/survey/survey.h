@@ -33,7 +33,12 @@ struct Survey {
   std::vector<PlannedImage> images;       // the survey
   std::vector<PlannedImage> queries;      // held out
   std::vector<Eigen::Vector2d> stations;  // where survey images are taken, metres
+  // Where the cameras are on the rig that takes the queries, and the images of a driven survey, whose names
+  // begin with RigFolder(camera); the first at its origin.  One where there is no rig.
+  std::vector<Pose> cams_from_rig;
 };
+
+std::string RigFolder(int camera);  // "cam0/"
 
 // cam_from_world of a camera at a place, looking along `heading_rad` (counter-clockwise from +x), pitched up
 // and rolled clockwise.

@@ -14,6 +14,7 @@
 #include "core/base/random.h"
 #include "core/capture/capture.h"
 #include "core/colmap/cameras_text.h"
+#include "core/colmap/rig_config.h"
 #include "core/files/file.h"
 #include "core/files/folder.h"
 #include "core/files/write_error.h"
@@ -74,6 +75,19 @@ std::vector<CaptureImage> StatedImages(const std::vector<sim::PlannedImage>& pla
   return images;
 }
 
+// The rig, and the folders of its images.
+Status WriteRig(const sim::Survey& survey, const std::string& folder) {
+  std::vector<RigCamera> cameras;
+  for (size_t i = 0; i < survey.cams_from_rig.size(); ++i) {
+    const std::string of_camera = sim::RigFolder(static_cast<int>(i));
+    std::error_code error;
+    if (!fs::create_directory(folder + "/images/" + of_camera, error))
+      return WriteError(folder, "cannot be created", error.value());
+    cameras.push_back({of_camera, survey.cams_from_rig[i], std::nullopt});
+  }
+  return WriteFileAtomically(folder + "/" + kRigConfigFile, RigConfigJson(cameras));
+}
+
 // What of the building is otherwise than when it was built: boxes, flat ones of panels, metres.
 std::string ChangesJson(const sim::Building& building) {
   nlohmann::ordered_json changes = nlohmann::ordered_json::array();
@@ -111,6 +125,7 @@ Result<SimulateResult> SimulateCapture(const sim::SimulateOptions& options, cons
     if (!fs::create_directory(folder + "/images", error)) {
       return WriteError(folder, "cannot be created", error.value());
     }
+    if (survey.cams_from_rig.size() > 1) CAIRN_RETURN_IF_ERROR(WriteRig(survey, folder));
     CAIRN_RETURN_IF_ERROR(
         WriteImages(building, survey, options, survey_seed, folder + "/images", num_threads, progress));
     CAIRN_RETURN_IF_ERROR(WriteCamerasText(
