@@ -15,6 +15,7 @@
 #include <nav_msgs/Odometry.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
+#include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud.h>
 #include <std_msgs/String.h>
 
@@ -75,6 +76,9 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("map_frame", &p->map_frame);
   reader.Read("follow", &p->follow);
   reader.Read("camera_in_robot", &p->camera_in_robot);
+  reader.Read("gravity", &p->gravity);
+  reader.Read("gravity_sigma_deg", &p->gravity_sigma_deg);
+  reader.Read("imu_in_robot", &p->imu_in_robot);
   reader.Read("camera_model", &p->camera_model);
   reader.Read("camera_params", &p->camera_params);
   reader.Read("log", &p->log);
@@ -146,6 +150,7 @@ class LocalizerNode {
     if (parameters_.where) places_ = node.advertise<sensor_msgs::PointCloud>("places", 1);
     if (parameters_.where || parameters_.follow)
       odometry_ = node.subscribe("odom", 1000, &LocalizerNode::OnOdometry, this);
+    if (parameters_.gravity) imu_ = node.subscribe("imu", 1000, &LocalizerNode::OnImu, this);
     goals_ = node.subscribe("goal", 1, &LocalizerNode::OnGoal, this);
     progress_ = node.subscribe("progress", 10, &LocalizerNode::OnProgress, this);
     // Only the newest image: queued ones would be old.
@@ -196,6 +201,26 @@ class LocalizerNode {
     if (!localizer_->AddOdometry(message->header.stamp.toSec(), pose.position.x, pose.position.y,
                                  HeadingOf(pose.orientation)))
       ROS_ERROR_THROTTLE(10, "odometry that is not finite does not count");
+  }
+
+  // By its attitude; by its accelerations alone where it tells none (REP 145: covariance -1, or no
+  // quaternion), and the robot neither speeds up nor brakes.
+  void OnImu(const sensor_msgs::Imu::ConstPtr& message) {
+    constexpr double kGravityMS2 = 9.81, kAtRestRatio = 0.03, kUnit = 0.01;
+    const double stamp_s = message->header.stamp.toSec();
+    const geometry_msgs::Quaternion& q = message->orientation;
+    const double norm = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+    bool is_taken = true;
+    if (message->orientation_covariance[0] >= 0 && std::abs(norm - 1) < kUnit) {
+      is_taken = localizer_->AddUp(stamp_s, 2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x),
+                                   1 - 2 * (q.x * q.x + q.y * q.y));
+    } else {
+      const geometry_msgs::Vector3& a = message->linear_acceleration;
+      const double length = std::sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
+      if (std::abs(length / kGravityMS2 - 1) > kAtRestRatio) return;
+      is_taken = localizer_->AddUp(stamp_s, a.x, a.y, a.z);
+    }
+    if (!is_taken) ROS_ERROR_THROTTLE(10, "an attitude that is not finite does not count");
   }
 
   // An image that was taken before does not count.
@@ -314,7 +339,7 @@ class LocalizerNode {
   NodeParameters parameters_;
   MapLocalizer* localizer_;
   ros::Publisher poses_, diagnostics_, starts_, way_, verdicts_, next_, places_;
-  ros::Subscriber images_, goals_, progress_, odometry_;
+  ros::Subscriber images_, goals_, progress_, odometry_, imu_;
   std::unique_ptr<Velocity> velocity_;  // null: the robot is not steered
   double steered_s_ = 0;                // when the image of the last command was taken
   std::string next_name_, steering_, steering_why_;

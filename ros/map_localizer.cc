@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "ros/gravity.h"
 #include "ros/grey_pixels.h"
 #include "ros/odometry.h"
 #include "ros/robot_pose.h"
@@ -19,16 +20,16 @@ namespace {
 
 using namespace cairn;  // NOLINT: this file is the bridge
 
-Result<Pose> MountingOf(const std::vector<double>& numbers) {
+// Of a parameter.
+Result<Pose> MountingOf(const char* name, const std::vector<double>& numbers) {
   if (numbers.empty()) return Pose();
   if (numbers.size() != 7)
     return MakeError(ErrorCode::kInvalidArgument,
-                     "~camera_in_robot has {} numbers, expected 7: x y z (metres), qx qy qz qw",
-                     numbers.size());
+                     "~{} has {} numbers, expected 7: x y z (metres), qx qy qz qw", name, numbers.size());
   const Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (!(std::abs(q.norm() - 1) < 1e-3))
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "~camera_in_robot: the quaternion's length is {}, expected 1", q.norm());
+    return MakeError(ErrorCode::kInvalidArgument, "~{}: the quaternion's length is {}, expected 1", name,
+                     q.norm());
   return Pose{q.normalized(), {numbers[0], numbers[1], numbers[2]}};
 }
 
@@ -72,6 +73,7 @@ struct MapLocalizer::State {
   std::shared_ptr<SharedLog> log;          // null: none
   std::optional<Steerer> steerer;          // with Parameters::steer
   std::optional<Whereabouts> whereabouts;  // with Parameters::where
+  std::optional<Gravity> gravity;          // with Parameters::gravity
   double place_probability = 0;            // of the last fix's place
 
   // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, SharedLog::Open.
@@ -87,12 +89,29 @@ struct MapLocalizer::State {
       return MakeError(
           ErrorCode::kInvalidArgument,
           "~min_place_probability is of the places that ~where finds; set that, or leave it out");
+    if (parameters.gravity) {
+      CAIRN_RETURN_IF_ERROR(BeginGravity());
+    }
     if (parameters.where) {
       CAIRN_ASSIGN_OR_RETURN(whereabouts,
                              Whereabouts::Make(map, robot_from_camera, parameters.where_period_s));
     }
     if (parameters.log.empty()) return Ok();
     CAIRN_ASSIGN_OR_RETURN(log, SharedLog::Open(parameters.log, *map, parameters.log_max_mb_per_day));
+    return Ok();
+  }
+
+  Status BeginGravity() {
+    if (parameters.camera_in_robot.empty())
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "~gravity is of the robot's IMU: set ~camera_in_robot, which says how the camera is mounted");
+    if (!(parameters.gravity_sigma_deg > 0) || !std::isfinite(parameters.gravity_sigma_deg))
+      return MakeError(ErrorCode::kInvalidArgument, "~gravity_sigma_deg is {}; expected more than 0",
+                       parameters.gravity_sigma_deg);
+    CAIRN_ASSIGN_OR_RETURN(const Pose robot_from_imu, MountingOf("imu_in_robot", parameters.imu_in_robot));
+    gravity.emplace(robot_from_camera.rotation.conjugate() * robot_from_imu.rotation,
+                    parameters.gravity_sigma_deg);
     return Ok();
   }
 
@@ -110,6 +129,7 @@ struct MapLocalizer::State {
   Result<Localization> LocateByFeatures(const cv::Mat& grey, const Camera& camera, double stamp_s,
                                         std::optional<Places>* places) {
     QueryFrame frame(localizer, grey, camera);
+    if (const std::optional<SensedUp> up = UpAt(stamp_s)) frame.set_up(*up);
     const auto by_itself = [&]() -> Result<Localization> {
       CAIRN_ASSIGN_OR_RETURN(const Query* query, frame.WithAllFeatures());
       return localizer.LocalizeQuery(*query, std::nullopt);
@@ -121,6 +141,8 @@ struct MapLocalizer::State {
     if (log) log->Offer(&frame, found);
     return found;
   }
+
+  std::optional<SensedUp> UpAt(double stamp_s) const { return gravity ? gravity->At(stamp_s) : std::nullopt; }
 
   // What the frame says of places, and whether its fix, if it has one, is sure.
   Status Believe(QueryFrame* frame, double stamp_s, Localization* found, std::optional<Places>* places) {
@@ -134,7 +156,7 @@ struct MapLocalizer::State {
       if (is_followed) {
         CAIRN_ASSIGN_OR_RETURN(alone, localizer.LocalizeQuery(*query, std::nullopt));
       }
-      *places = whereabouts->See(*query, alone, stamp_s);
+      *places = whereabouts->See(*query, alone, stamp_s, frame->up());
       const auto probability_of = [&](const Localization& fix) {
         const bool is_known = fix.has_fix() && (*places)->error.empty();
         return is_known ? whereabouts->ProbabilityAround(fix.cam_from_world) : 0;
@@ -158,9 +180,14 @@ struct MapLocalizer::State {
     if (parameters.follow && moved && IsMetric(map->head().frame))
       CAIRN_RETURN_IF_ERROR(tracker.Move(moved->way_m, moved->turn_left_rad));
     const auto begin = std::chrono::steady_clock::now();
-    Result<Localization> found = log || whereabouts  ? LocateByFeatures(grey, camera, image.stamp_s, places)
-                                 : parameters.follow ? tracker.Track(grey, camera)
-                                                     : localizer.Localize(grey, camera);
+    const auto locate = [&]() -> Result<Localization> {
+      if (log || whereabouts) return LocateByFeatures(grey, camera, image.stamp_s, places);
+      const std::optional<SensedUp> up = UpAt(image.stamp_s);
+      if (!parameters.follow) return localizer.Localize(grey, camera, std::nullopt, up);
+      if (up) CAIRN_RETURN_IF_ERROR(tracker.SenseUp(*up));
+      return tracker.Track(grey, camera);
+    };
+    Result<Localization> found = locate();
     *library_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     return found;
   }
@@ -199,7 +226,7 @@ std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, i
     *message = error.message;
     return nullptr;
   };
-  const Result<Pose> mounting = MountingOf(parameters.camera_in_robot);
+  const Result<Pose> mounting = MountingOf("camera_in_robot", parameters.camera_in_robot);
   if (!mounting.ok()) return fail(mounting.error());
   const auto map = OpenMap(parameters);
   if (!map.ok()) return fail(map.error());
@@ -284,6 +311,10 @@ bool MapLocalizer::AddOdometry(double stamp_s, double x_m, double y_m, double he
   const PlanarPose pose{{x_m, y_m}, heading_rad};
   return state_->odometry.Add(stamp_s, pose).ok() &&
          (!state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, pose).ok());
+}
+
+bool MapLocalizer::AddUp(double stamp_s, double x, double y, double z) {
+  return !state_->gravity || state_->gravity->Add(stamp_s, {x, y, z}).ok();
 }
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }

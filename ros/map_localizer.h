@@ -20,6 +20,11 @@ struct Parameters {
   // Where the camera's optical frame is mounted on the robot: x y z (m), qx qy qz qw; empty: the pose is
   // the camera's.
   std::vector<double> camera_in_robot;
+  // What the topic imu says of up counts; how the IMU is mounted on the robot: as camera_in_robot; empty: as
+  // the robot's own axes.
+  bool gravity = false;
+  double gravity_sigma_deg = 2;
+  std::vector<double> imu_in_robot;
   std::string camera_model;  // COLMAP's name; empty: the map's camera of the image's size
   std::vector<double> camera_params;
   std::string log;  // folder of a log (docs/robots.md); empty: none
@@ -122,6 +127,9 @@ class MapLocalizer {
 
   // Where odometry has the robot: metres, radians to the left, in a frame of its own.  False: not finite.
   bool AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad);
+
+  // Which way is up in an IMU's frame, by what it says.  False: no direction, or not finite.
+  bool AddUp(double stamp_s, double x, double y, double z);
 
   std::string map_name() const;
   int64_t num_landmarks() const;

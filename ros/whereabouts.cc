@@ -38,7 +38,8 @@ bool Whereabouts::IsDue(double image_time_s) const {
   return !last_image_s_ || std::abs(TimeOr(image_time_s) - *last_image_s_) >= period_s_;
 }
 
-Places Whereabouts::See(const Query& query, const Localization& found, double image_time_s) {
+Places Whereabouts::See(const Query& query, const Localization& found, double image_time_s,
+                        const std::optional<SensedUp>& up) {
   const double time_s = TimeOr(image_time_s);
   const double seconds = time_s - std::exchange(last_image_s_, time_s).value_or(time_s);
   if (seconds < 0) {  // a recording begins again: nothing is known
@@ -46,17 +47,18 @@ Places Whereabouts::See(const Query& query, const Localization& found, double im
     if (!anew.ok()) return {.error = anew.error().message};
     belief_ = std::move(anew).value();
   }
-  Result<Places> places = Update(query, found, image_time_s, std::max(0.0, seconds));
+  Result<Places> places = Update(query, found, image_time_s, std::max(0.0, seconds), up);
   if (places.ok()) return std::move(places).value();
   return {.error = places.error().message};
 }
 
 Result<Places> Whereabouts::Update(const Query& query, const Localization& found, double image_time_s,
-                                   double seconds) {
+                                   double seconds, const std::optional<SensedUp>& up) {
   const std::optional<FloorMotion> move = odometry_.MoveTo(image_time_s);
   if (move && IsMetric(map_->head().frame))
     CAIRN_RETURN_IF_ERROR(belief_.Move(move->way_m, move->turn_left_rad));
   CAIRN_RETURN_IF_ERROR(belief_.Elapse(seconds));
+  if (up) CAIRN_RETURN_IF_ERROR(belief_.SenseUp(up->direction, up->sigma_deg));
   CAIRN_RETURN_IF_ERROR(belief_.See(query, found));
   Places places{.elsewhere = belief_.elsewhere()};
   CAIRN_ASSIGN_OR_RETURN(const auto hypotheses, belief_.Hypotheses(static_cast<int>(map_->num_images())));

@@ -27,8 +27,9 @@ class Whereabouts {
   cairn::Status AddOdometry(double time_s, const cairn::PlanarPose& odom_from_robot);
   // Whether the period since the last image is over; 0: now, by a clock of its own.
   bool IsDue(double image_time_s) const;
-  // The next image, and what it says by itself.
-  Places See(const cairn::Query& query, const cairn::Localization& found, double image_time_s);
+  // The next image, what it says by itself, and which way was up at it.
+  Places See(const cairn::Query& query, const cairn::Localization& found, double image_time_s,
+             const std::optional<cairn::SensedUp>& up);
   // As PlaceBelief has it.
   double ProbabilityAround(const cairn::Pose& cam_from_world) const {
     return belief_.ProbabilityAround(cam_from_world);
@@ -43,7 +44,7 @@ class Whereabouts {
         belief_(std::move(belief)),
         odometry_(robot_from_camera) {}
   cairn::Result<Places> Update(const cairn::Query& query, const cairn::Localization& found,
-                               double image_time_s, double seconds);
+                               double image_time_s, double seconds, const std::optional<cairn::SensedUp>& up);
 
   std::shared_ptr<const cairn::Map> map_;
   cairn::Pose robot_from_camera_;

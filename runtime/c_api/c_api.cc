@@ -28,6 +28,7 @@ struct OpenLocalizer : OfOneThread {
   std::unique_ptr<Localizer> localizer;
   std::shared_ptr<const VisualMap> visual;  // once it was asked for
   std::shared_ptr<SharedLog> log;           // where it has one
+  std::optional<SensedUp> up;               // of the next image
 };
 
 Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>& OpenLocalizers() {
@@ -48,7 +49,7 @@ const char* cairn_error_name(int32_t code) {
 }
 
 const char* cairn_reason_name(int32_t reason) {
-  return reason < CAIRN_FIX || reason > CAIRN_IMPROBABLE ? "unknown" : NoFixName(static_cast<NoFix>(reason));
+  return reason < CAIRN_FIX || reason > CAIRN_TILTED ? "unknown" : NoFixName(static_cast<NoFix>(reason));
 }
 
 const char* cairn_scope_name(int32_t scope) {
@@ -177,10 +178,40 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
-    CAIRN_ASSIGN_OR_RETURN(const Query query, used->localizer->QueryFromImage(grey, chosen));
+    CAIRN_ASSIGN_OR_RETURN(Query query, used->localizer->QueryFromImage(grey, chosen));
+    if (used->up) {
+      CAIRN_RETURN_IF_ERROR(used->localizer->SetUp(*std::exchange(used->up, std::nullopt), &query));
+    }
     CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(query, believed));
     Return(FixFrom(found), fix);
     if (used->log) used->log->Offer(query, found);
+    return Ok();
+  });
+}
+
+int32_t cairn_localizer_sense_up(cairn_localizer* localizer, double right, double down, double ahead,
+                                 double sigma_deg) {
+  return Call("cairn_localizer_sense_up", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    const SensedUp up{{right, down, ahead}, sigma_deg};
+    CAIRN_RETURN_IF_ERROR(CheckSensedUp(up));
+    used->up = up;
+    return Ok();
+  });
+}
+
+int32_t cairn_localize_rig(cairn_localizer* localizer, const cairn_rig_image* const* images,
+                           int32_t num_images, const cairn_prior* prior, cairn_fix* fix) {
+  return Call("cairn_localize_rig", [&]() -> Status {
+    CAIRN_RETURN_IF_ERROR(CheckFix(fix));
+    Return(FixFrom({}), fix);
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<RigImage> rig, RigImagesOf(images, num_images, *used->map));
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
+    CAIRN_ASSIGN_OR_RETURN(
+        const Localization found,
+        used->localizer->LocalizeRig(rig, believed, std::exchange(used->up, std::nullopt)));
+    Return(FixFrom(found), fix);
     return Ok();
   });
 }

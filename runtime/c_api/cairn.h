@@ -71,8 +71,9 @@ enum {
   CAIRN_POOR_SPREAD = 6,
   CAIRN_UNCERTAIN = 7,
   CAIRN_FAR_FROM_SURVEY = 8,
-  CAIRN_AMBIGUOUS = 9,  /* another place explains the image nearly as well */
-  CAIRN_IMPROBABLE = 10 /* most of what an image from there would show is missing */
+  CAIRN_AMBIGUOUS = 9,   /* another place explains the image nearly as well */
+  CAIRN_IMPROBABLE = 10, /* most of what an image from there would show is missing */
+  CAIRN_TILTED = 11      /* up is not where it was sensed */
 };
 
 /* Which landmarks an image was matched with.  Append-only. */
@@ -187,6 +188,19 @@ typedef struct cairn_prior {
 } cairn_prior;
 #define CAIRN_PRIOR_INIT \
   { sizeof(cairn_prior), {1, 0, 0, 0}, {0, 0, 0}, 1, 10 }
+
+/* What a camera of a rig sees, at the same time as the others. */
+typedef struct cairn_rig_image {
+  size_t size;
+  const cairn_image* image;
+  const cairn_camera* camera; /* NULL: the survey's camera of the image's size */
+  double rotation_wxyz[4];    /* cam_from_rig, a unit quaternion */
+  double translation_m[3];
+} cairn_rig_image;
+#define CAIRN_RIG_IMAGE_INIT                                       \
+  {                                                                \
+    sizeof(cairn_rig_image), NULL, NULL, {1, 0, 0, 0}, { 0, 0, 0 } \
+  }
 
 /* A pose and how well it is known: a camera's cam_from_world, or how it moved from a frame to the next. */
 typedef struct cairn_uncertain_pose {
@@ -344,6 +358,16 @@ CAIRN_API int32_t cairn_localizer_destroy(cairn_localizer* localizer);
  * error: see fix->has_fix.  After an error *fix has no fix. */
 CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image,
                                  const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix);
+/* Which way is up at the next image, or the next of a rig: a direction in the camera's frame (a rig's), of
+ * any length, and its standard deviation per axis.  An accelerometer says so while the robot does not speed
+ * up or brake, an IMU always.  Poses then come from two landmarks, not three, and none tilts the camera
+ * (CAIRN_TILTED); the map's floor says what is up in the world. */
+CAIRN_API int32_t cairn_localizer_sense_up(cairn_localizer* localizer, double right, double down,
+                                           double ahead, double sigma_deg);
+/* One fix of what the cameras of a rig see at the same time: fix and prior are poses of the rig
+ * (rig_from_world).  Nothing of it is logged. */
+CAIRN_API int32_t cairn_localize_rig(cairn_localizer* localizer, const cairn_rig_image* const* images,
+                                     int32_t num_images, const cairn_prior* prior, cairn_fix* fix);
 /* The same by the visual map, on the floor.  CAIRN_NOT_FOUND where the map has none; the first call loads it.
  */
 CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
@@ -372,12 +396,13 @@ CAIRN_API int32_t cairn_tracker_move(cairn_tracker* tracker, double ahead_m, dou
                                      double turn_left_rad);
 CAIRN_API int32_t cairn_tracker_move_camera(cairn_tracker* tracker,
                                             const cairn_uncertain_pose* next_from_last);
-/* What else is known of the next frame, for a tracker with the option ("min_place_probability", "0.9"): it
- * publishes a fix only where its place has this probability by all frames so far, as cairn_place_belief has
- * it.  Seconds [1] and gravity as there.  CAIRN_INVALID_ARGUMENT: the option is 0, the default. */
-CAIRN_API int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds);
+/* Which way is up at the next frame, as cairn_localizer_sense_up has it. */
 CAIRN_API int32_t cairn_tracker_sense_up(cairn_tracker* tracker, double right, double down, double ahead,
                                          double sigma_deg);
+/* Seconds from the last frame to the next [1], for a tracker with the option ("min_place_probability",
+ * "0.9"): it publishes a fix only where its place has this probability by all frames so far, as
+ * cairn_place_belief has it.  CAIRN_INVALID_ARGUMENT: the option is 0, the default. */
+CAIRN_API int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds);
 /* Where the next frame is expected.  *is_expected 0: the tracker is lost, and *prior is CAIRN_PRIOR_INIT. */
 CAIRN_API int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cairn_prior* prior);
 /* Where the camera was at the last frame: its fix, or where it moved since the last one; and after a move,

@@ -12,7 +12,7 @@
 namespace cairn {
 namespace {
 
-static_assert(CAIRN_IMPROBABLE == static_cast<int>(NoFix::kImprobable));
+static_assert(CAIRN_TILTED == static_cast<int>(NoFix::kTilted));
 static_assert(CAIRN_SCOPE_VOTES == static_cast<int>(Scope::kVotes));
 
 // A longer stride is an overflowed sum, not a distance between rows.
@@ -82,6 +82,26 @@ Result<std::optional<Camera>> GivenCameraOf(const cairn_camera* given) {
 Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey) {
   CAIRN_ASSIGN_OR_RETURN(const std::optional<Camera> camera, GivenCameraOf(given));
   return camera ? Result<Camera>(*camera) : map.CameraForSize(grey.cols, grey.rows);
+}
+
+Result<std::vector<RigImage>> RigImagesOf(const cairn_rig_image* const* images, int32_t num_images,
+                                          const Map& map) {
+  constexpr int32_t kMaxNumImages = 64;
+  if (images == nullptr) return Misuse("images is NULL");
+  if (num_images < 1 || num_images > kMaxNumImages)
+    return Misuse("num_images is {}; expected 1 to {}", num_images, kMaxNumImages);
+  std::vector<RigImage> rig;
+  for (int32_t i = 0; i < num_images; ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckStruct(images[i], "images"));
+    RigImage of_camera;
+    CAIRN_ASSIGN_OR_RETURN(of_camera.grey, PixelsOf(images[i]->image));
+    CAIRN_ASSIGN_OR_RETURN(of_camera.camera, CameraOf(images[i]->camera, map, of_camera.grey));
+    const double* q = images[i]->rotation_wxyz;
+    of_camera.cam_from_rig = {Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
+                              Eigen::Vector3d(images[i]->translation_m)};
+    rig.push_back(std::move(of_camera));
+  }
+  return rig;
 }
 
 Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given) {

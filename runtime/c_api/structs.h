@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
@@ -9,6 +10,7 @@
 #include "core/camera/camera.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/localization.h"
+#include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
 #include "runtime/map/update_map.h"
 #include "runtime/track/camera_motion.h"
@@ -32,6 +34,10 @@ Result<GivenOptions> OptionsOf(const cairn_map_options* options);
 Result<std::optional<Camera>> GivenCameraOf(const cairn_camera* given);
 // NULL: the survey's camera of the image's size.
 Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey);
+
+// What the cameras of a rig see; pixels are not copied.
+Result<std::vector<RigImage>> RigImagesOf(const cairn_rig_image* const* images, int32_t num_images,
+                                          const Map& map);
 
 // NULL: none.
 Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given);

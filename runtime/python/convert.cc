@@ -90,7 +90,13 @@ Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera
   return given ? *given : ValueOrThrow(map.CameraForSize(grey.cols, grey.rows));
 }
 
-namespace {
+SensedUp MakeUp(const std::vector<double>& direction, double sigma_deg) {
+  if (direction.size() != 3)
+    throw py::value_error(fmt::format("direction has {} numbers; expected 3", direction.size()));
+  const SensedUp up{Eigen::Vector3d(direction.data()), sigma_deg};
+  if (const Status checked = CheckSensedUp(up); !checked.ok()) throw py::value_error(checked.error().message);
+  return up;
+}
 
 Pose MakePose(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation) {
   if (rotation_wxyz.size() != 4 || translation.size() != 3)
@@ -104,8 +110,6 @@ Pose MakePose(const std::vector<double>& rotation_wxyz, const std::vector<double
   if (!t.allFinite()) throw py::value_error("translation is not finite");
   return {q.normalized(), t};
 }
-
-}  // namespace
 
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg) {

@@ -61,6 +61,12 @@ Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg);
 
+// Throws a ValueError for what is no direction, or a standard deviation that is not positive.
+SensedUp MakeUp(const std::vector<double>& direction, double sigma_deg);
+
+// Throws a ValueError for an invalid rotation or number.
+Pose MakePose(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation);
+
 // Throws a ValueError for an invalid rotation, number or shape; None: no error at all.
 UncertainPose MakeUncertainPose(const std::vector<double>& rotation_wxyz,
                                 const std::vector<double>& translation,

@@ -38,6 +38,13 @@ PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::op
   return {ValueOrThrow(Map::Open(name, options)), name};
 }
 
+// An image of a camera of a rig.
+struct PyRigImage {
+  py::array image;
+  Pose cam_from_rig;
+  std::optional<Camera> camera;
+};
+
 class PyLocalizer {
  public:
   PyLocalizer(const PyMap& map, const PyLog* log, const py::kwargs& given)
@@ -48,16 +55,27 @@ class PyLocalizer {
   }
 
   Localization Localize(const py::array& image, const std::optional<Camera>& camera,
-                        const std::optional<PosePrior>& prior) {
+                        const std::optional<PosePrior>& prior, const std::optional<SensedUp>& up) {
     const cv::Mat grey = PixelsOf(image);
     const py::gil_scoped_release release;
     const auto used = one_thread_.Use();
     const Camera chosen = CameraFor(*map_, grey, camera);
-    if (!log_) return ValueOrThrow(localizer_->Localize(grey, chosen, prior));
-    const Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
+    if (!log_) return ValueOrThrow(localizer_->Localize(grey, chosen, prior, up));
+    Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
+    if (up) ThrowIfError(localizer_->SetUp(*up, &query));
     Localization found = ValueOrThrow(localizer_->LocalizeQuery(query, prior));
     log_->Offer(query, found);
     return found;
+  }
+
+  Localization LocalizeRig(const std::vector<PyRigImage>& images, const std::optional<PosePrior>& prior,
+                           const std::optional<SensedUp>& up) {
+    std::vector<RigImage> rig;
+    for (const PyRigImage& image : images) rig.push_back({PixelsOf(image.image), {}, image.cam_from_rig});
+    const py::gil_scoped_release release;
+    const auto used = one_thread_.Use();
+    for (size_t i = 0; i < rig.size(); ++i) rig[i].camera = CameraFor(*map_, rig[i].grey, images[i].camera);
+    return ValueOrThrow(localizer_->LocalizeRig(rig, prior, up));
   }
 
  private:
@@ -194,6 +212,33 @@ void BindLocalizer(py::module_& module) {
         return fmt::format("<cairn.Prior at ({:.3f}, {:.3f}, {:.3f}) m, +- {:g} m, {:g} deg>", center.x(),
                            center.y(), center.z(), self.sigma_m, self.sigma_deg);
       });
+  py::class_<SensedUp>(module, "Up")
+      .def(py::init(&MakeUp), py::arg("direction"), py::arg("sigma_deg") = SensedUp().sigma_deg)
+      .def_property_readonly("direction", [](const SensedUp& self) { return VectorArray(self.direction); })
+      .def_readonly("sigma_deg", &SensedUp::sigma_deg)
+      .def("__repr__", [](const SensedUp& self) {
+        return fmt::format("cairn.Up(({:g}, {:g}, {:g}), {:g})", self.direction.x(), self.direction.y(),
+                           self.direction.z(), self.sigma_deg);
+      });
+  py::class_<PyRigImage>(module, "RigImage")
+      .def(py::init([](const py::array& image, const std::vector<double>& rotation_wxyz,
+                       const std::vector<double>& translation, const std::optional<Camera>& camera) {
+             PixelsOf(image);  // throws where it has none
+             return PyRigImage{image, MakePose(rotation_wxyz, translation), camera};
+           }),
+           py::arg("image").noconvert(), py::arg("rotation_wxyz") = std::vector<double>{1, 0, 0, 0},
+           py::arg("translation") = std::vector<double>{0, 0, 0}, py::arg("camera") = py::none())
+      .def_property_readonly("image", [](const PyRigImage& self) { return self.image; })
+      .def_property_readonly("rotation_wxyz",
+                             [](const PyRigImage& self) { return RotationArray(self.cam_from_rig.rotation); })
+      .def_property_readonly(
+          "translation", [](const PyRigImage& self) { return VectorArray(self.cam_from_rig.translation); })
+      .def_readonly("camera", &PyRigImage::camera)
+      .def("__repr__", [](const PyRigImage& self) {
+        const Eigen::Vector3d& t = self.cam_from_rig.translation;
+        return fmt::format("<cairn.RigImage of {} x {} px, translation ({:.3f}, {:.3f}, {:.3f}) m>",
+                           self.image.shape(1), self.image.shape(0), t.x(), t.y(), t.z());
+      });
   py::class_<UncertainPose>(module, "UncertainPose")
       .def(py::init(&MakeUncertainPose), py::arg("rotation_wxyz"), py::arg("translation"),
            py::arg("covariance") = py::none())
@@ -239,7 +284,9 @@ void BindLocalizer(py::module_& module) {
       .def(py::init<const PyMap&, const PyLog*, const py::kwargs&>(), py::arg("map"), py::kw_only(),
            py::arg("log") = py::none())
       .def("localize", &PyLocalizer::Localize, py::arg("image").noconvert(), py::arg("camera") = py::none(),
-           py::arg("prior") = py::none());
+           py::arg("prior") = py::none(), py::arg("up") = py::none())
+      .def("localize_rig", &PyLocalizer::LocalizeRig, py::arg("images"), py::arg("prior") = py::none(),
+           py::arg("up") = py::none());
 }
 
 PyLog OpenLog(const PyMap& map, const py::object& folder, double max_mb_per_day) {

@@ -1,7 +1,7 @@
 #!/bin/sh
-# What the shared library links and exports:  check_library.sh LIBRARY C_SYMBOLS
+# What the shared library links and exports:  check_library.sh LIBRARY C_SYMBOLS C_HEADER
 set -eu
-library=$1 c_symbols=$2
+library=$1 c_symbols=$2 c_header=$3
 
 needed=$(readelf -d "$library" | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p')
 for unwanted in colmap ceres geos CBC Cbc imgcodecs tomlplusplus spdlog yaml CLI exif; do
@@ -20,6 +20,11 @@ declared=$(sed -n 's/^ *\(cairn_[a-z_]*\);$/\1@@CAIRN_0/p' "$c_symbols" | sort)
 exported=$(nm -D --defined-only "$library" | awk '{print $3}' | grep '^cairn_' | sort)
 if [ "$declared" != "$exported" ]; then
   echo "the C API is not what $c_symbols lists; exported: $exported" >&2
+  exit 1
+fi
+in_header=$(grep -oE '\bcairn_[a-z_]+\(' "$c_header" | sed 's/($/@@CAIRN_0/' | sort -u)
+if [ "$in_header" != "$exported" ]; then
+  echo "the C API is not what $c_header declares; exported: $exported" >&2
   exit 1
 fi
 foreign=$(nm -D --defined-only "$library" | awk '$2 != "A" {print $3}' | grep -v '^cairn_' |

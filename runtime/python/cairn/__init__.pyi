@@ -313,6 +313,41 @@ class AtlasLocalizer:
         """`camera` None: each map's own camera of the image's size."""
 
 @final
+class Up:
+    """Which way is up, as an accelerometer says while the robot does not speed up or brake, or an IMU."""
+
+    def __init__(self, direction: Sequence[float] | NDArray[np.float64], sigma_deg: float = 1) -> None:
+        """`direction`: in the camera's frame (x right, y down, z ahead), of any length; of a rig in the rig's.  `sigma_deg`: per axis."""
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """(3,)"""
+    @property
+    def sigma_deg(self) -> float: ...
+
+@final
+class RigImage:
+    """What a camera of a rig sees."""
+
+    def __init__(
+        self,
+        image: NDArray[np.uint8],
+        rotation_wxyz: Sequence[float] | NDArray[np.float64] = (1, 0, 0, 0),
+        translation: Sequence[float] | NDArray[np.float64] = (0, 0, 0),
+        camera: Camera | None = None,
+    ) -> None:
+        """`image`: as Localizer.localize's; the pose: cam_from_rig, metres."""
+    @property
+    def image(self) -> NDArray[np.uint8]: ...
+    @property
+    def rotation_wxyz(self) -> NDArray[np.float64]:
+        """A unit quaternion: (4,)"""
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Metres: (3,)"""
+    @property
+    def camera(self) -> Camera | None: ...
+
+@final
 class UncertainPose:
     """A pose and how well it is known: a camera's cam_from_world, or how it moved from a frame to the next."""
 
@@ -471,12 +506,15 @@ class Localizer:
     def __init__(self, map: Map, *, log: Log | None = None, **options: bool | int | float | str) -> None:
         """`log`: of the same map; `options`: any that `cairn localize --help` lists under "Stage options", such as min_num_inliers=9."""
     def localize(
-        self, image: NDArray[np.uint8], camera: Camera | None = None, prior: Prior | None = None
+        self, image: NDArray[np.uint8], camera: Camera | None = None, prior: Prior | None = None, up: Up | None = None
     ) -> Fix:
         """From grey pixels, (height, width); rows may have gaps; other memory layouts raise a ValueError.
 
-        `camera` None: the survey's camera of the image's size.  Releases the interpreter's lock meanwhile.
+        `camera` None: the survey's camera of the image's size.  `up`: poses come from two landmarks, not three, and none tilts the
+        camera.  Releases the interpreter's lock meanwhile.
         """
+    def localize_rig(self, images: Sequence[RigImage], prior: Prior | None = None, up: Up | None = None) -> Fix:
+        """One fix of what the cameras of a rig see at the same time: fix, prior and up are the rig's.  Nothing of it is logged."""
 
 @final
 class Tracker:
@@ -496,13 +534,14 @@ class Tracker:
         """
     def move_camera(self, next_from_last: UncertainPose) -> None:
         """The same in space, from the camera's frame at the last frame to that now, as visual or inertial odometry has it."""
+    def sense_up(self, up_in_camera: Sequence[float], sigma_deg: float) -> None:
+        """Which way is up at the next frame, as Up has it."""
     def elapse(self, seconds: float) -> None:
-        """With min_place_probability=0.9 a fix is published only where its place has this probability by all frames so far.
+        """Seconds from the last frame to the next [1]: as PlaceBelief's.
 
-        This and sense_up say what else is known of the next frame: as PlaceBelief's.  Raises Error: invalid_argument (the option is 0, the
-        default).
+        With min_place_probability=0.9 a fix is published only where its place has this probability by all frames so far.  Raises Error:
+        invalid_argument (the option is 0, the default).
         """
-    def sense_up(self, up_in_camera: Sequence[float], sigma_deg: float) -> None: ...
     def predict(self) -> Prior | None:
         """Where the next frame is expected; None when lost."""
     def believe(self) -> UncertainPose | None:
