@@ -20,7 +20,7 @@
 #include "core/base/random.h"
 #include "core/capture/capture.h"
 #include "core/colmap/cameras_text.h"
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 
 namespace cairn {
 namespace {

@@ -198,9 +198,10 @@ std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
 }
 
 std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
-                                   const std::array<Eigen::Vector3d, 2>& points, const KnownDirection& up) {
+                                   const std::array<Eigen::Vector3d, 2>& points,
+                                   const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world) {
   // In level frames, z up, only the heading is open.
-  const Eigen::Matrix3d level_from_rig = LevelFrom(up.in_rig), level_from_world = LevelFrom(up.in_world);
+  const Eigen::Matrix3d level_from_rig = LevelFrom(up_in_rig), level_from_world = LevelFrom(up_in_world);
   std::array<Eigen::Vector3d, 2> d;
   for (int i = 0; i < 2; ++i) d[i] = level_from_rig * rays[i].direction;
   const Eigen::Vector3d origin = level_from_rig * (rays[0].origin - rays[1].origin);

@@ -15,12 +15,6 @@ struct RigRay {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
 };
 
-// A direction that is known in both frames, of length 1 in each: up, from an accelerometer and from the map.
-struct KnownDirection {
-  Eigen::Vector3d in_rig = -Eigen::Vector3d::UnitY();
-  Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();
-};
-
 // The rig_from_world that put three points on these rays, ahead of their origins: at most 8 (generalised P3P:
 // Nister & Stewenius, "A minimal solution to the generalised 3-point pose problem", 2007; here by the
 // resultant of the three distances' equations).  None where the rays do not determine it: parallel ones, or
@@ -28,10 +22,11 @@ struct KnownDirection {
 std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
                                      const std::array<Eigen::Vector3d, 3>& points);
 
-// The same of two points and a known direction: at most 2 (Kukelova, Bujnak, Pajdla, "Closed-form solutions
-// to minimal absolute pose problems with known vertical direction", 2010).  Two points on the horizon do not
-// determine it.
+// The same of two points and a direction that is known in both frames, up say, of length 1 in each: at most 2
+// (Kukelova, Bujnak, Pajdla, "Closed-form solutions to minimal absolute pose problems with known vertical
+// direction", 2010).  Two points on the horizon do not determine it.
 std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
-                                   const std::array<Eigen::Vector3d, 2>& points, const KnownDirection& up);
+                                   const std::array<Eigen::Vector3d, 2>& points,
+                                   const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world);
 
 }  // namespace cairn

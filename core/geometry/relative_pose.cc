@@ -4,7 +4,7 @@
 
 #include <Eigen/Dense>
 
-#include "core/geometry/nearest_rotation.h"
+#include "core/geometry/rotations.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn {

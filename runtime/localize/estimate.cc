@@ -9,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/base/random.h"
+#include "core/geometry/minimal_pose.h"
 #include "runtime/localize/refine.h"
 
 namespace cairn {
@@ -134,15 +135,15 @@ std::vector<Pose> SolveThreePoints(const std::vector<PoseMeasurement>& measureme
 }
 
 std::vector<Pose> SolveTwoPoints(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
-                                 const KnownDirection& up) {
+                                 const UpMeasurement& up) {
   const auto [rays, points] = RaysAndPointsOf<2>(measurements, sample);
-  return PosesFromTwoRays(rays, points, up);
+  return PosesFromTwoRays(rays, points, up.in_rig, up.in_world);
 }
 
 // The poses that a sample leads to.
 std::vector<Pose> Solve(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
                         int sample_size, const std::optional<UpMeasurement>& up) {
-  if (sample_size == 2) return SolveTwoPoints(measurements, sample, up->up);
+  if (sample_size == 2) return SolveTwoPoints(measurements, sample, *up);
   std::vector<Pose> poses = SolveThreePoints(measurements, sample);
   if (up) std::erase_if(poses, [&](const Pose& pose) { return UpErrorInSigmas(*up, pose) > kMaxUpSigmas; });
   return poses;

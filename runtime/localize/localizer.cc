@@ -16,7 +16,6 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/place_evidence.h"
 #include "runtime/localize/refine.h"
-#include "runtime/localize/region_votes.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
@@ -162,8 +161,8 @@ Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& came
 Status Localizer::SetUp(const SensedUp& up, Query* query) const {
   CAIRN_RETURN_IF_ERROR(CheckSensedUp(up));
   const MapHead& head = map_->head();
-  query->up = UpMeasurement{{head.camera_from_given.rotation * up.direction.normalized(),
-                             head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ()},
+  query->up = UpMeasurement{head.camera_from_given.rotation * up.direction.normalized(),
+                            head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ(),
                             RadFromDeg(std::hypot(up.sigma_deg, options_.floor_up_sigma_deg))};
   return Ok();
 }

@@ -8,7 +8,6 @@
 #include "runtime/localize/accept.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/region_votes.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/appearance_map.h"
 

@@ -12,7 +12,6 @@
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
-#include "core/geometry/minimal_pose.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/localizer_options.h"
 
@@ -42,7 +41,8 @@ struct QueryRay {
 // Up, as a robot's accelerometer says and as the map does, and how well the two agree where a pose is right:
 // standard deviation per axis, rad.
 struct UpMeasurement {
-  KnownDirection up;
+  Eigen::Vector3d in_rig = -Eigen::Vector3d::UnitY();  // of length 1, as the other
+  Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();
   double sigma_rad = 0;
 };
 

@@ -79,7 +79,7 @@ struct UpError {
   Eigen::Matrix<double, 2, 3> jacobian;
 };
 
-UpError LineariseUp(const KnownDirection& up, const Pose& pose) {
+UpError LineariseUp(const UpMeasurement& up, const Pose& pose) {
   const Eigen::Vector3d at_pose = pose.rotation * up.in_world;
   const Eigen::Matrix<double, 2, 3> basis = TangentBasis(up.in_rig).transpose();
   const Eigen::Vector2d sines = basis * at_pose;
@@ -95,7 +95,7 @@ struct WeightedUp {
 
   double Information() const { return variance_unit / (up->sigma_rad * up->sigma_rad); }
   double Cost(const Pose& pose) const {
-    return up ? Information() * LineariseUp(up->up, pose).angles.squaredNorm() : 0;
+    return up ? Information() * LineariseUp(*up, pose).angles.squaredNorm() : 0;
   }
 };
 
@@ -104,7 +104,7 @@ NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measure
                                      double scale, const WeightedUp& up) {
   NormalEquations equations;
   if (up.up) {
-    const UpError error = LineariseUp(up.up->up, pose);
+    const UpError error = LineariseUp(*up.up, pose);
     equations.matrix.topLeftCorner<3, 3>() = up.Information() * error.jacobian.transpose() * error.jacobian;
     equations.gradient.head<3>() = up.Information() * error.jacobian.transpose() * error.angles;
     equations.cost = up.Information() * error.angles.squaredNorm();
@@ -281,7 +281,7 @@ std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements,
 }
 
 double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world) {
-  return LineariseUp(up.up, rig_from_world).angles.norm() / up.sigma_rad;
+  return LineariseUp(up, rig_from_world).angles.norm() / up.sigma_rad;
 }
 
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,

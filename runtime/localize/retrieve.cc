@@ -281,6 +281,33 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
   return regions;
 }
 
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
+  std::vector<LandmarkIdx> ascending = landmarks;
+  std::sort(ascending.begin(), ascending.end());
+  std::map<RegionIdx, int> counts;
+  int64_t ordinal = -1;
+  for (const LandmarkIdx landmark : ascending) {
+    const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
+    if (next == ordinal) continue;
+    ordinal = next;
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+    // [Sala06 §III] a vote for each region that it belongs to
+    for (const auto& [region, of_region] : block->regions) counts[region] += NumShared(of_region, ascending);
+  }
+  std::vector<RegionVotes> votes;
+  for (const auto& [region, count] : counts) {
+    if (count > 0) votes.push_back({region, count});
+  }
+  std::stable_sort(votes.begin(), votes.end(),
+                   [](const RegionVotes& a, const RegionVotes& b) { return a.num_votes > b.num_votes; });
+  return votes;
+}
+
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, landmarks));
+  return votes.empty() ? -1 : votes.front().region;
+}
+
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions) {
   std::vector<LandmarkIdx> landmarks;
   for (const RegionIdx region : regions) {

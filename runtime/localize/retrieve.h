@@ -44,6 +44,17 @@ Result<int32_t> ImageNearFix(const Map& map, const Localization& found);
 Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
                                                    const RetrieveOptions& options);
 
+// For every region the number of these landmarks (each once) that it has, most first, ties to the smaller
+// index; regions without any are left out.  Errors: as Map::Landmarks.
+struct RegionVotes {
+  RegionIdx region = -1;
+  int num_votes = 0;
+};
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+
+// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+
 // Landmarks of regions, of images, ascending, each once.
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
 Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);

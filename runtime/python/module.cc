@@ -92,6 +92,8 @@ namespace pybind11::detail {
 
 template <>
 struct type_caster<cairn::PyLocalizer> : ConstructedCaster<cairn::PyLocalizer> {};
+template <>
+struct type_caster<cairn::PyRigImage> : ConstructedCaster<cairn::PyRigImage> {};
 
 }  // namespace pybind11::detail
 
@@ -233,7 +235,10 @@ void BindLocalizer(py::module_& module) {
                              [](const PyRigImage& self) { return RotationArray(self.cam_from_rig.rotation); })
       .def_property_readonly(
           "translation", [](const PyRigImage& self) { return VectorArray(self.cam_from_rig.translation); })
-      .def_readonly("camera", &PyRigImage::camera)
+      .def_property_readonly("camera",
+                             [](const PyRigImage& self) -> py::object {
+                               return self.camera ? py::cast(Camera(*self.camera)) : py::none();
+                             })
       .def("__repr__", [](const PyRigImage& self) {
         const Eigen::Vector3d& t = self.cam_from_rig.translation;
         return fmt::format("<cairn.RigImage of {} x {} px, translation ({:.3f}, {:.3f}, {:.3f}) m>",

@@ -77,6 +77,8 @@ struct type_caster<cairn::Camera> : ConstructedCaster<cairn::Camera> {};
 template <>
 struct type_caster<cairn::PosePrior> : ConstructedCaster<cairn::PosePrior> {};
 template <>
+struct type_caster<cairn::SensedUp> : ConstructedCaster<cairn::SensedUp> {};
+template <>
 struct type_caster<cairn::UncertainPose> : ConstructedCaster<cairn::UncertainPose> {};
 template <>
 struct type_caster<cairn::Localization> : ConstructedCaster<cairn::Localization> {};

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "runtime/localize/localizer.h"
-#include "runtime/localize/region_votes.h"
 #include "runtime/track/camera_motion.h"
+#include "runtime/track/region_votes.h"
 
 namespace cairn {
 

@@ -6,7 +6,7 @@
 
 #include "core/options/options.h"
 #include "runtime/localize/localization.h"
-#include "runtime/localize/region_votes.h"
+#include "runtime/track/region_votes.h"
 #include "runtime/visual_map/visual_filter.h"
 
 namespace cairn {

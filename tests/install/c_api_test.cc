@@ -1,4 +1,5 @@
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <thread>
@@ -63,6 +64,82 @@ TEST_F(CApi, GivesThePoseOfTheCxxApiBitForBit) {
   EXPECT_EQ(Matrix6d(fix.covariance), expected->covariance.transpose());  // rows here, columns in Eigen
   EXPECT_EQ(fix.num_inliers, expected->num_inliers);
   EXPECT_EQ(fix.region, expected->region);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+}
+
+TEST_F(CApi, RigsAndGravityAreThoseOfTheCxxApi) {
+  cairn_localizer* localizer = NewLocalizer();
+  Pose beside;  // half a metre to the right, turned by ten degrees
+  beside.rotation = Eigen::AngleAxisd(RadFromDeg(10), Eigen::Vector3d::UnitY());
+  beside.translation = {-0.5, 0, 0.1};
+  const cv::Mat second = RenderPoster(scene_, beside * PosterQueryPose());
+  const cairn_image image = Picture();
+  cairn_image other = image;
+  other.pixels = second.data;
+  cairn_rig_image left = CAIRN_RIG_IMAGE_INIT, right = CAIRN_RIG_IMAGE_INIT;
+  left.image = &image;
+  right.image = &other;
+  const Eigen::Quaterniond& q = beside.rotation;
+  const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
+  std::copy_n(wxyz, 4, right.rotation_wxyz);
+  std::copy_n(beside.translation.data(), 3, right.translation_m);
+  const cairn_rig_image* rig[] = {&left, &right};
+
+  const auto map = *Map::Open(path_);
+  const Camera camera = *map->CameraForSize(320, 240);
+  const SensedUp up{{0.01, -2, 0.02}, 1.5};
+  cairn_fix fix = CAIRN_FIX_INIT;
+  const auto expect_same = [&](const Localization& expected) {
+    EXPECT_EQ(fix.has_fix, expected.has_fix()) << fix.message;
+    EXPECT_EQ(fix.reason, static_cast<int>(expected.reason));
+    if (expected.has_fix()) {
+      EXPECT_EQ(Eigen::Vector3d(fix.translation_m), expected.cam_from_world.translation);
+      EXPECT_EQ(Matrix6d(fix.covariance), expected.covariance.transpose());
+    }
+  };
+  for (const bool with_up : {false, true}) {
+    if (with_up) {
+      ASSERT_EQ(cairn_localizer_sense_up(localizer, 0.01, -2, 0.02, 1.5), CAIRN_OK) << cairn_last_error();
+    }
+    ASSERT_EQ(cairn_localize_rig(localizer, rig, 2, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+    const Localization expected =
+        *Localizer(map).LocalizeRig({{picture_, camera, Pose()}, {second, camera, beside}}, std::nullopt,
+                                    with_up ? std::optional(up) : std::nullopt);
+    ASSERT_TRUE(expected.has_fix()) << expected.message;
+    EXPECT_LT(CenterErrorM(expected.cam_from_world, PosterQueryPose()), 0.05);
+    expect_same(expected);
+  }
+  // Of one image; and only of the next.
+  ASSERT_EQ(cairn_localizer_sense_up(localizer, 0.01, -2, 0.02, 1.5), CAIRN_OK);
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
+  expect_same(*Localizer(map).Localize(picture_, camera, std::nullopt, up));
+  ASSERT_EQ(cairn_localizer_sense_up(localizer, 1, -1, 0, 1), CAIRN_OK);
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
+  EXPECT_EQ(fix.has_fix, 0);
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
+  EXPECT_EQ(fix.has_fix, 1);
+  EXPECT_STREQ(cairn_reason_name(CAIRN_TILTED), "tilted");
+  EXPECT_STREQ(cairn_reason_name(CAIRN_TILTED + 1), "unknown");
+
+  const auto expect_misuse = [&](int32_t code, const char* words) {
+    EXPECT_EQ(code, CAIRN_INVALID_ARGUMENT);
+    EXPECT_THAT(cairn_last_error(), HasSubstr(words));
+    EXPECT_EQ(fix.has_fix, 0);
+  };
+  expect_misuse(cairn_localize_rig(localizer, nullptr, 2, nullptr, &fix), "images is NULL");
+  expect_misuse(cairn_localize_rig(localizer, rig, 0, nullptr, &fix), "num_images is 0");
+  expect_misuse(cairn_localize_rig(localizer, rig, 65, nullptr, &fix), "num_images is 65");
+  const cairn_rig_image* holes[] = {&left, nullptr};
+  expect_misuse(cairn_localize_rig(localizer, holes, 2, nullptr, &fix), "images is NULL");
+  right.rotation_wxyz[0] = 7;
+  expect_misuse(cairn_localize_rig(localizer, rig, 2, nullptr, &fix), "is no pose");
+  right.image = nullptr;
+  expect_misuse(cairn_localize_rig(localizer, rig, 2, nullptr, &fix), "image is NULL");
+  right.size = 8;
+  expect_misuse(cairn_localize_rig(localizer, rig, 2, nullptr, &fix), "images->size is 8");
+  expect_misuse(cairn_localizer_sense_up(localizer, 0, 0, 0, 1), "no direction");
+  expect_misuse(cairn_localizer_sense_up(localizer, 0, -1, 0, std::nan("")), "sigma of nan degrees");
+  EXPECT_EQ(cairn_localize_rig(nullptr, rig, 2, nullptr, &fix), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
 }
 

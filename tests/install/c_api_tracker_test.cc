@@ -166,8 +166,9 @@ TEST_F(CTrackers, GoOnInTheDarkByOdometryAsTheCxxTrackerDoes) {
 
 TEST_F(CTrackers, PublishWhatIsSureAsTheCxxTrackerDoes) {
   EXPECT_EQ(cairn_tracker_elapse(tracker_, 0.1), CAIRN_INVALID_ARGUMENT);
-  EXPECT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_INVALID_ARGUMENT);
   EXPECT_THAT(cairn_last_error(), testing::HasSubstr("min_place_probability"));
+  EXPECT_EQ(cairn_tracker_sense_up(tracker_, 0, 0, 0, 2), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_OK) << cairn_last_error();
   ASSERT_EQ(cairn_tracker_set_option(tracker_, "min_place_probability", "0.97"), CAIRN_OK)
       << cairn_last_error();
   ASSERT_EQ(cairn_tracker_set_option(tracker_, "place_elsewhere_ratio", "0.6"), CAIRN_OK)
@@ -186,6 +187,20 @@ TEST_F(CTrackers, PublishWhatIsSureAsTheCxxTrackerDoes) {
     ASSERT_EQ(cairn_tracker_sense_up(tracker_, 0, -1, 0, 2), CAIRN_OK) << cairn_last_error();
     ASSERT_TRUE(tracker.SenseUp({0, -1, 0}, 2).ok());
     ExpectSame(Track(i), *tracker.Track(frame.picture, QueryCamera()));
+  }
+}
+
+TEST_F(CTrackers, FollowWithGravityAsTheCxxTrackerDoes) {
+  RegionTracker tracker(map_);
+  for (int i = 0; i < static_cast<int>(Drive().frames().size()); ++i) {
+    const DriveFrame& frame = Drive().frames()[i];
+    // Where it contradicts, there is no fix.
+    const double right = i == 1 ? 0.7 : 0.01;
+    ASSERT_EQ(cairn_tracker_sense_up(tracker_, right, -1, 0.02, 1), CAIRN_OK) << cairn_last_error();
+    ASSERT_TRUE(tracker.SenseUp({{right, -1, 0.02}, 1}).ok());
+    const Localization expected = *tracker.Track(frame.picture, QueryCamera());
+    EXPECT_TRUE(i != 1 || !expected.has_fix());
+    ExpectSame(Track(i), expected);
   }
 }
 

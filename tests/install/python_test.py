@@ -452,6 +452,79 @@ class Localizing(Poster):
         self.assertFalse(cairn.Localizer(self.map, min_num_inliers=100000).localize(self.image))
         self.assertTrue(cairn.Localizer(self.map, exclude_look_alikes=False).localize(self.image))
 
+    def test_gravity_is_what_the_program_makes_of_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            gravity = pathlib.Path(folder) / "gravity.txt"
+            gravity.write_text("# right, down, ahead\n0.01 -2 0.02\n1 -1 0\n")
+            printed = subprocess.run([PROGRAM, "localize", POSTER / "poster.cairn", POSTER / "poster.pgm", POSTER / "poster.pgm",
+                                      "--gravity", gravity, "--gravity-sigma-deg", "1.5"], capture_output=True, check=True, text=True).stdout
+        right, tilted = [json.loads(line) for line in printed.splitlines()]
+        up = cairn.Up((0.01, -2, 0.02), 1.5)
+        self.assertEqual(self.localizer.localize(self.image, up=up).translation.tolist(), right["translation_m"])
+        self.assertEqual((up.direction.tolist(), up.sigma_deg, cairn.Up((0, -1, 0)).sigma_deg), ([0.01, -2, 0.02], 1.5, 1))
+        self.assertIn("1.5", repr(up))
+        fix = self.localizer.localize(self.image, up=cairn.Up([1, -1, 0], sigma_deg=1.5))
+        self.assertFalse(fix)
+        self.assertEqual(fix.reason, tilted["reason"])
+        for direction, sigma_deg in (((0, 0, 0), 1), ((0, 1), 1), ((0, math.nan, 1), 1), ((0, -1, 0), 0), ((0, -1, 0), -1)):
+            with self.assertRaises(ValueError):
+                cairn.Up(direction, sigma_deg)
+
+    def test_a_rigs_pose_is_the_programs(self):
+        """Pictures of the drive, as of two cameras 10 cm apart."""
+        drive = cairn.Map.open(POSTER / "drive.cairn")
+        localizer = cairn.Localizer(drive)
+        pictures = [read_pgm(POSTER / f"{i}.pgm") for i in (0, 1)]
+        fixes = [localizer.localize(picture) for picture in pictures]
+        cam1_from_cam0 = fixes[1].cam_from_world @ numpy.linalg.inv(fixes[0].cam_from_world)
+        rotation = [1, 0, 0, 0]  # the drive does not turn
+        translation = [round(number, 3) for number in cam1_from_cam0[:3, 3].tolist()]
+        images = [cairn.RigImage(pictures[0]), cairn.RigImage(pictures[1], rotation, translation, drive.camera_for_size(320, 240))]
+        found = localizer.localize_rig(images)
+        self.assertTrue(found, found.message)
+        numpy.testing.assert_allclose(found.center, fixes[0].center, atol=0.05)
+        self.assertGreater(found.num_inliers, fixes[0].num_inliers)
+        self.assertTrue(localizer.localize_rig(images, cairn.Prior(found.rotation_wxyz, found.translation), cairn.Up((0, -1, 0))))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for camera, i in (("left", 0), ("right", 1)):
+                (folder / camera).mkdir()
+                shutil.copy(POSTER / f"{i}.pgm", folder / camera / "a.pgm")
+            (folder / "rig.json").write_text(json.dumps([{"cameras": [
+                {"image_prefix": "left/", "ref_sensor": True},
+                {"image_prefix": "right/", "cam_from_rig_rotation": rotation, "cam_from_rig_translation": translation}]}]))
+            localize = [PROGRAM, "localize", POSTER / "drive.cairn", "--rig", folder / "rig.json"]
+            printed = json.loads(subprocess.run([*localize, folder / "left" / "a.pgm"], capture_output=True, check=True, text=True).stdout)
+            self.assertEqual(found.translation.tolist(), printed["translation_m"])
+            self.assertEqual(found.covariance.T.ravel().tolist(), printed["covariance"])
+            # What does not go together, or is not there, is said.
+            for options, words in (([folder / "right" / "a.pgm"], "left/"), (["--sequence", folder / "left" / "a.pgm"], "follows one camera"),
+                                   (["--log", folder / "log", folder / "left" / "a.pgm"], "--log"),
+                                   (["--camera", "PINHOLE,320,240,280,280,160,120", folder / "left" / "a.pgm"], "--camera"),
+                                   (["--gravity-sigma-deg", "1", folder / "left" / "a.pgm"], "give that"),
+                                   (["--max-up-sigmas", "3", folder / "left" / "a.pgm"], "give --gravity"),
+                                   (["--gravity", folder / "none.txt", folder / "left" / "a.pgm"], "none.txt")):
+                run = subprocess.run([*localize, *options], capture_output=True, text=True)
+                self.assertNotEqual(run.returncode, 0, options)
+                self.assertIn(words, run.stderr + run.stdout)
+            (folder / "right" / "a.pgm").unlink()
+            run = subprocess.run([*localize, folder / "left" / "a.pgm"], capture_output=True, text=True)
+            self.assertNotEqual(run.returncode, 0)
+            self.assertIn("right/a.pgm", run.stderr)
+        self.assertEqual(images[1].translation.tolist(), translation)
+        self.assertEqual(images[1].rotation_wxyz.tolist(), rotation)
+        self.assertEqual((images[0].camera, images[1].camera.width), (None, 320))
+        self.assertIs(images[0].image, pictures[0])
+        self.assertIn("320 x 240", repr(images[0]))
+        with self.assertRaises(cairn.Error):
+            localizer.localize_rig([])
+        with self.assertRaises(TypeError):
+            cairn.RigImage(pictures[0].astype(float))
+        with self.assertRaises(ValueError):
+            cairn.RigImage(pictures[0], (1, 1, 0, 0))
+        with self.assertRaises(ValueError):
+            cairn.RigImage(pictures[0], translation=(0, 0, math.inf))
+
     def test_threads_run_side_by_side_and_one_localizer_is_for_one(self):
         # Another thread runs Python while this one localizes: the interpreter's lock is free.
         ticks, done = [0], threading.Event()
@@ -811,6 +884,8 @@ class Refusing(Poster):
                 lambda: cairn.Map.__new__(cairn.Map).camera_for_size(320, 240),
                 lambda: self.localizer.localize(self.image, camera=cairn.Camera.__new__(cairn.Camera)),
                 lambda: self.localizer.localize(self.image, prior=cairn.Prior.__new__(cairn.Prior)),
+                lambda: self.localizer.localize(self.image, up=cairn.Up.__new__(cairn.Up)),
+                lambda: self.localizer.localize_rig([cairn.RigImage.__new__(cairn.RigImage)]),
                 lambda: bool(cairn.Fix.__new__(cairn.Fix)),
                 lambda: bool(cairn.FloorFix.__new__(cairn.FloorFix)),
                 lambda: cairn.Tracker(cairn.Map.__new__(cairn.Map)),
@@ -822,7 +897,8 @@ class Refusing(Poster):
                 lambda: cairn.Tracker(self.map).track(self.image, camera=cairn.Camera.__new__(cairn.Camera))]
         on_floor = cairn.VisualTracker(cairn.Map.open(POSTER / "drive.cairn")).track(self.image)
         prior = cairn.Prior([1, 0, 0, 0], [0, 0, 0])
-        for example in self.map, self.map.camera_for_size(320, 240), made, on_floor, prior:
+        up, rig_image = cairn.Up((0, -1, 0)), cairn.RigImage(self.image)
+        for example in self.map, self.map.camera_for_size(320, 240), made, on_floor, prior, up, rig_image:
             kind = type(example)
             uses.append(lambda kind=kind: repr(kind.__new__(kind)))
             for name, value in vars(kind).items():

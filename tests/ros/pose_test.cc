@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "ros/gravity.h"
 #include "ros/grey_pixels.h"
 #include "ros/odometry.h"
 #include "ros/robot_pose.h"
@@ -179,6 +180,37 @@ TEST(Odometry, BeginsAnewWhereTimeGoesBackAndRefusesWhatIsNotFinite) {
   EXPECT_FALSE(odometry.Add(nan, {{0, 0}, 0}).ok());
   ASSERT_TRUE(odometry.MoveTo(1.4));
   EXPECT_NEAR(odometry.MoveTo(1.4)->way_m.x(), 0, 1e-12);
+}
+
+// An IMU whose x is up where the camera's y is down.
+TEST(Gravity, IsWhatWasSaidNearestToTheImageInItsCamerasFrame) {
+  const Eigen::Quaterniond camera_from_imu =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitY());
+  Gravity gravity(camera_from_imu, 1.5);
+  EXPECT_FALSE(gravity.At(0));
+  ASSERT_TRUE(gravity.Add(10, {9.81, 0, 0}).ok());
+  ASSERT_TRUE(gravity.Add(10.06, {0, 9.81, 0}).ok());
+  ASSERT_TRUE(gravity.At(10.02));
+  EXPECT_LT((gravity.At(10.02)->direction - Eigen::Vector3d(0, -9.81, 0)).norm(), 1e-9);
+  EXPECT_EQ(gravity.At(10.02)->sigma_deg, 1.5);
+  const Eigen::Vector3d second = camera_from_imu * Eigen::Vector3d(0, 9.81, 0);
+  for (const double image_time_s : {10.04, 10.06, 10.15, 0.0})
+    EXPECT_LT((gravity.At(image_time_s)->direction - second).norm(), 1e-9) << image_time_s;
+  EXPECT_LT((gravity.At(9.91)->direction - Eigen::Vector3d(0, -9.81, 0)).norm(), 1e-9);
+  for (const double too_far : {9.89, 10.17}) EXPECT_FALSE(gravity.At(too_far)) << too_far;
+  // A recording begins again.
+  ASSERT_TRUE(gravity.Add(2, {9.81, 0, 0}).ok());
+  EXPECT_FALSE(gravity.At(10.02));
+  EXPECT_TRUE(gravity.At(2));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(gravity.Add(3, {0, 0, 0}).ok());
+  EXPECT_FALSE(gravity.Add(3, {nan, 0, 0}).ok());
+  EXPECT_FALSE(gravity.Add(nan, {1, 0, 0}).ok());
+  EXPECT_FALSE(gravity.At(3));
+  // Of minutes of an IMU the last seconds are known.
+  for (int i = 0; i < 10000; ++i) ASSERT_TRUE(gravity.Add(20 + 0.001 * i, {1, 0, 0}).ok());
+  EXPECT_TRUE(gravity.At(29.9));
+  EXPECT_FALSE(gravity.At(25.5));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/capture/capture.h"
+#include "core/colmap/rig_config.h"
 #include "core/files/file.h"
 #include "stages/simulate/command.h"
 
@@ -53,6 +54,44 @@ class SimulateCaptureTest : public testing::Test {
   fs::path folder_;
   NoProgress progress_;
 };
+
+TEST_F(SimulateCaptureTest, ARigTakesTheQueriesOfALatticeAndAllOfADrive) {
+  sim::SimulateOptions options = TinyOptions();
+  options.rig_num_cameras = 3;
+  options.rig_radius_m = 0.25;
+  ASSERT_TRUE(SimulateCapture(options, Path("lattice"), 7, 2, progress_).ok());
+  options.survey = "driven";
+  options.step_m = 2;
+  ASSERT_TRUE(SimulateCapture(options, Path("driven"), 7, 2, progress_).ok());
+  for (const char* name : {"lattice", "driven"}) {
+    const Capture capture = *ReadCapture(Path(name));
+    const auto rig = *ReadRigConfig(Path(name) + "/rig_config.json");
+    ASSERT_EQ(rig.size(), 3U);
+    std::map<std::string, Pose> poses;
+    for (const auto* images : {&capture.images, &capture.queries}) {
+      for (const CaptureImage& image : *images) poses[image.name] = *image.cam_from_world;
+    }
+    int num_rigs = 0;
+    for (const auto& [image, pose] : poses) {
+      EXPECT_TRUE(fs::exists(Path(name) + "/images/" + image)) << image;
+      if (!NameInRig(rig, 0, image).ok()) continue;
+      ++num_rigs;
+      for (size_t camera = 0; camera < 3; ++camera) {
+        const Pose expected = rig[camera].cam_from_rig * pose;
+        const Pose stated = poses.at(*NameInRig(rig, camera, image));
+        EXPECT_LT(CenterErrorM(stated, expected), 1e-5);
+        EXPECT_LT(RotationErrorDeg(stated, expected), 1e-3);
+      }
+      // Evenly turned, each so far from the axis.
+      EXPECT_NEAR(CenterErrorM(poses.at(*NameInRig(rig, 1, image)), pose), 0.25 * std::sqrt(3.0), 1e-4);
+      EXPECT_NEAR(RotationErrorDeg(poses.at(*NameInRig(rig, 1, image)), pose), 120, 1e-3);
+    }
+    EXPECT_EQ(num_rigs,
+              static_cast<int>(capture.queries.size() / 3) +
+                  (name == std::string("driven") ? static_cast<int>(capture.images.size() / 3) : 0));
+  }
+  EXPECT_EQ((*ReadCapture(Path("lattice"))).queries.size(), 15U);
+}
 
 TEST_F(SimulateCaptureTest, WritesTheSameBytesForAnyNumberOfThreads) {
   ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("one"), 7, 1, progress_).ok());

@@ -3,7 +3,7 @@
 #include "core/base/text.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/colmap_model.h"
-#include "core/geometry/nearest_rotation.h"
+#include "core/geometry/rotations.h"
 
 namespace cairn::pipeline {
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "core/base/parallel.h"
-#include "core/geometry/nearest_rotation.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/rotations.h"
 
 namespace cairn::reconstruct {
 namespace {

@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/base/quantiles.h"
-#include "core/geometry/nearest_rotation.h"
+#include "core/geometry/rotations.h"
 
 namespace cairn::reconstruct {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "core/base/quantiles.h"
 #include "core/base/random.h"
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "core/structure/bundle_blocks.h"
 #include "stages/reconstruct/inertial/inertial_costs.h"
 

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "stages/reconstruct/inertial/inertial_alignment.h"
 #include "stages/reconstruct/inertial/preintegration.h"
 

@@ -7,7 +7,7 @@
 #include <Eigen/SparseCore>
 
 #include "core/base/quantiles.h"
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 
 namespace cairn::reconstruct {
 namespace {

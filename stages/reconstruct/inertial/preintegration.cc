@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn::reconstruct {

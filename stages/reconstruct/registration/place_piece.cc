@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "core/base/quantiles.h"
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn::reconstruct {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <queue>
 
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "core/structure/disjoint_sets.h"
 #include "stages/reconstruct/view_graph/differences.h"
 

@@ -130,12 +130,12 @@ TEST(PosesFromTwoRays, TheTruePoseIsAmongThemAndAllKeepUpUp) {
       std::array<Eigen::Vector3d, 2> points;
       LookAt(truth, extent_m, random, &rays, &points);
       const Eigen::Vector3d up_in_world = RandomVector(random, 1).normalized();
-      const KnownDirection up{truth.rotation * up_in_world, up_in_world};
-      const std::vector<Pose> poses = PosesFromTwoRays(rays, points, up);
+      const Eigen::Vector3d up_in_rig = truth.rotation * up_in_world;
+      const std::vector<Pose> poses = PosesFromTwoRays(rays, points, up_in_rig, up_in_world);
       EXPECT_LE(poses.size(), 2U);
       for (const Pose& pose : poses) {
         EXPECT_LT(WorstMiss(pose, rays, points), 1e-4);
-        EXPECT_LT((pose.rotation * up.in_world - up.in_rig).norm(), 1e-9);
+        EXPECT_LT((pose.rotation * up_in_world - up_in_rig).norm(), 1e-9);
       }
       num_found += Nearest(poses, truth) < 1e-5 ? 1 : 0;
     }
@@ -144,16 +144,16 @@ TEST(PosesFromTwoRays, TheTruePoseIsAmongThemAndAllKeepUpUp) {
 }
 
 TEST(PosesFromTwoRays, NothingIsDeterminedOnTheHorizonOrByOnePoint) {
-  const KnownDirection up;  // y is down in the rig's frame
+  const Eigen::Vector3d up = -Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
   const std::array<RigRay, 2> level = {RigRay{{0, 0, 0}, Eigen::Vector3d(0.6, 0, 0.8)},
                                        RigRay{{0, 0, 0}, Eigen::Vector3d(0, 0, 1)}};
-  EXPECT_TRUE(PosesFromTwoRays(level, {Eigen::Vector3d(1, 0, 0), {2, 1, 0}}, up).empty());
+  EXPECT_TRUE(PosesFromTwoRays(level, {Eigen::Vector3d(1, 0, 0), {2, 1, 0}}, up, z).empty());
   const RigRay ray{{0, 0, 0}, Eigen::Vector3d(0, 0.6, 0.8)};
-  EXPECT_TRUE(PosesFromTwoRays({ray, ray}, {Eigen::Vector3d(1, 0, 0), {1, 0, 0}}, up).empty());
+  EXPECT_TRUE(PosesFromTwoRays({ray, ray}, {Eigen::Vector3d(1, 0, 0), {1, 0, 0}}, up, z).empty());
   // Points farther apart than rays can put them at one height.
   const std::array<RigRay, 2> steep = {RigRay{{0, 0, 0}, Eigen::Vector3d(0, 1, 0)},
                                        RigRay{{0, 0, 0}, Eigen::Vector3d(0, -1, 0)}};
-  EXPECT_TRUE(PosesFromTwoRays(steep, {Eigen::Vector3d(0, 0, 0), {5, 0, 2}}, up).empty());
+  EXPECT_TRUE(PosesFromTwoRays(steep, {Eigen::Vector3d(0, 0, 0), {5, 0, 2}}, up, z).empty());
 }
 
 }  // namespace

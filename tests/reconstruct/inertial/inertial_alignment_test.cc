@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "tests/reconstruct/inertial/simulated_imu.h"
 
 namespace cairn::reconstruct {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/base/random.h"
-#include "core/geometry/rotation_vector.h"
+#include "core/geometry/rotations.h"
 #include "core/geometry/similarity.h"
 #include "stages/reconstruct/inertial/inertial_alignment.h"
 #include "stages/reconstruct/inertial/inertial_start.h"

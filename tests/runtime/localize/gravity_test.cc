@@ -58,7 +58,7 @@ std::vector<PoseMeasurement> MakeScene(const Pose& truth, int num_inliers, int n
 }
 
 UpMeasurement UpOf(const Pose& truth, double sigma_deg) {
-  return {{UpAt(truth), Eigen::Vector3d::UnitZ()}, RadFromDeg(sigma_deg)};
+  return {UpAt(truth), Eigen::Vector3d::UnitZ(), RadFromDeg(sigma_deg)};
 }
 
 TEST(Gravity, TwoPointsFindWhatThreeDoNotInAsManySamples) {
@@ -130,7 +130,7 @@ TEST(Gravity, CovarianceKnowsIt) {
     const Pose truth = Tilted(PoseAt({0, 0, 1}, random.Uniform(0, 360)), 10, 5);
     const auto measurements = MakeScene(truth, 40, 0, 8, random);
     UpMeasurement up = UpOf(truth, 0.3);
-    up.up.in_rig = Sensed(up.up.in_rig, 0.3, random);
+    up.in_rig = Sensed(up.in_rig, 0.3, random);
     RefineOptions options;
     options.inlier_chi_square = 100;
     const auto with = RefinePoseWithCovariance(measurements, truth, options, up),

@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "runtime/localize/match.h"
-#include "runtime/localize/region_votes.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {

@@ -71,8 +71,9 @@ TEST(Rig, PosesOfPointsThatNoCameraSeesThreeOf) {
   EXPECT_GE(estimate->inliers.size(), 16U);
   EXPECT_LT(CenterErrorM(estimate->cam_from_world, truth), 1e-3);
   EXPECT_LT(RotationErrorDeg(estimate->cam_from_world, truth), 0.02);
-  const auto with_up = EstimatePose(measurements, {}, {}, 0,
-                                    UpMeasurement{{truth.rotation * Eigen::Vector3d::UnitZ()}, 0.001});
+  const auto with_up =
+      EstimatePose(measurements, {}, {}, 0,
+                   UpMeasurement{truth.rotation * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ(), 0.001});
   ASSERT_TRUE(with_up);
   EXPECT_LT(CenterErrorM(with_up->cam_from_world, truth), 1e-3);
 }

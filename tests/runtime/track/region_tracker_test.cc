@@ -3,8 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/localize/region_votes.h"
+#include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
+#include "runtime/track/region_votes.h"
 #include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 namespace cairn {
 
@@ -26,6 +27,14 @@ Eigen::Matrix<T, 3, 1> VectorFromQuaternion(const Eigen::Quaternion<T>& q) {
   if (squared < T(1e-16)) return T(2) * sign * q.vec();
   const T sine = sqrt(squared);
   return (T(2) * atan2(sine, sign * q.w()) / sine) * sign * q.vec();
+}
+
+// The rotation R with the largest trace of R^T M: nearest to M, and of M = sum of b a^T the one that turns
+// the vectors a into b best [Umeyama91].
+inline Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& M) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
 }
 
 }  // namespace cairn

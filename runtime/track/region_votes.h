@@ -33,17 +33,6 @@ OptionTable DescribeOptions(VoteOptions* options);
 // Fewest votes of a candidate.
 inline constexpr int kLeastVotes = 2;
 
-// For every region the number of these landmarks (each once) that it has, most first, ties to the smaller
-// index; regions without any are left out.  Errors: as Map::Landmarks.
-struct RegionVotes {
-  RegionIdx region = -1;
-  int num_votes = 0;
-};
-Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
-
-// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
-
 // The most landmarks of a region that any one image of the survey shows.  O(images that see them).  Errors:
 // as Map::Images.
 Result<int> MostInView(const Map& map, RegionIdx region);

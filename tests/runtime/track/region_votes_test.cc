@@ -1,4 +1,4 @@
-#include "runtime/localize/region_votes.h"
+#include "runtime/track/region_votes.h"
 
 #include <numeric>
 
