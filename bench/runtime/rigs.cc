@@ -95,7 +95,13 @@ Status Run(const std::string& map_path, const std::string& capture_path, double 
                                           figures == &with[set] ? std::optional(up) : std::nullopt));
         figures->feature_ms.push_back(1000 * seconds);
         figures->all_ms.push_back(1000 * (seconds + CpuSeconds() - start));
+        const int num_wrong = figures->num_wrong;
         figures->Add(found, truth);
+        if (figures->num_wrong > num_wrong) {
+          fmt::print(stderr, "\nwrong: {} of {} cameras{}: {:.2f} m, {:.1f}°, P {:.4f}, {} inliers\n", name,
+                     taken.size(), figures == &with[set] ? ", gravity" : "", figures->errors_m.back(),
+                     figures->errors_deg.back(), found.probability, found.num_inliers);
+        }
       }
     }
   }

@@ -28,7 +28,7 @@ class CamerasAt {
   // Squared reprojection error in px, at most `limit`.  Fast where measurements of one image follow each
   // other.
   double TruncatedError(const PoseMeasurement& measurement, double limit) {
-    if (measurement.image != image_) {
+    if (measurement.image != image_ || measurement.row) {
       image_ = measurement.image;
       Turn(measurement.cam_from_rig ? *measurement.cam_from_rig * rig_from_world_ : rig_from_world_);
     }
@@ -243,14 +243,22 @@ OptionTable DescribeOptions(EstimateOptions* o) {
   };
 }
 
+namespace {
+
+// How far one standard deviation of up moves points in the image.
+double UpErrorPx(const std::vector<PoseMeasurement>& measurements, const UpMeasurement& up) {
+  return up.sigma_rad * std::sqrt(std::abs(measurements.front().ray.pixel_from_ray.determinant()));
+}
+
+}  // namespace
+
 bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options) {
   if (!up || measurements.empty()) return false;
-  // An error of up moves points in the image: about those of the sample that are inliers then, local
-  // refinement finds the others.
+  // An error of up moves points in the image: of those that are inliers all the same, local refinement finds
+  // the others.
   constexpr double kMaxErrors = 3;
-  const double focal_px = std::sqrt(std::abs(measurements.front().ray.pixel_from_ray.determinant()));
-  return up->sigma_rad * focal_px <= kMaxErrors * options.max_error_px;
+  return UpErrorPx(measurements, *up) <= kMaxErrors * options.max_error_px;
 }
 
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
@@ -259,6 +267,9 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
   const int num_measurements = static_cast<int>(measurements.size());
   if (num_measurements < kMinNumInliers) return {};
   const int sample_size = UsesTwoPoints(measurements, up, options) ? 2 : 3;
+  // Where its error is larger than an inlier's, two points may lead to a wrong pose: every other sample is of
+  // three.
+  const bool alternates = sample_size == 2 && UpErrorPx(measurements, *up) > options.max_error_px;
   const double limit = options.max_error_px * options.max_error_px;
   std::vector<ScoredPose> best;  // by score
   Random random(seed);
@@ -267,8 +278,9 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
   int num_iterations = std::max(options.min_num_ransac_iterations, options.max_num_ransac_iterations);
   int iteration = 0;
   for (; iteration < num_iterations; ++iteration) {
-    const Sample sample = DrawSample(num_measurements, sample_size, random);
-    for (const Pose& pose : Solve(measurements, sample, sample_size, up)) {
+    const int size = alternates && iteration % 2 == 1 ? 3 : sample_size;
+    const Sample sample = DrawSample(num_measurements, size, random);
+    for (const Pose& pose : Solve(measurements, sample, size, up)) {
       const double needed = ScoreNeeded(best, max_num_poses, limit, num_measurements);
       double score = Score(measurements, pose, limit, needed);
       if (score >= needed) continue;

@@ -12,12 +12,22 @@
 namespace cairn {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // Where the camera is believed to be: in the frame in which poses are reported.
 struct PosePrior {
   Pose cam_from_world;
   double sigma_m = 1;     // of its place, per axis
   double sigma_deg = 10;  // of its rotation
+};
+
+// How a camera moves while an image is read, from the top row to the bottom row (a rolling shutter): the
+// perturbation of its pose (refine.h), rotation (rad), translation (m), and standard deviations of what is
+// not known of it.
+struct ReadoutMotion {
+  Vector6d motion = Vector6d::Zero();
+  Vector6d sigmas = Vector6d::Zero();
+  bool is_none() const { return motion.isZero(0) && sigmas.isZero(0); }
 };
 
 // Which way is up, as an accelerometer says while the robot does not speed up or brake, or an IMU.

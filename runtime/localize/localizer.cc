@@ -240,7 +240,7 @@ Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& l
   const std::vector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
   const auto refined =
       RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first, options_.refine, query.up);
-  if (!refined || static_cast<int>(refined->inliers.size()) <= fix.num_inliers ||
+  if (!refined || static_cast<int>(refined->inliers.size()) < fix.num_inliers ||
       AreFarApart(refined->cam_from_world, first, options_.accept))
     return fix;
   const std::vector<Correspondence> inliers = Select(matches, refined->inliers);

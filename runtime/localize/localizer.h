@@ -92,7 +92,7 @@ class Localizer {
                                      const std::optional<PosePrior>& prior) const;
 
   // A fix made more exact by what the query shows of these landmarks where it puts them: the same fix where
-  // that is no more than what it was made of.  Nothing else about it changes.
+  // that is less than what it was made of.  Nothing else about it changes.
   Result<Localization> Sharpen(const Query& query, const LandmarkSet& landmarks, Localization fix) const;
 
   const LocalizerOptions& options() const { return options_; }
@@ -168,6 +168,12 @@ class QueryFrame {
   // Which way was up.  REQUIRES: CheckSensedUp
   void set_up(const SensedUp& up) { up_ = up; }
   const std::optional<SensedUp>& up() const { return up_; }
+  // Query::readout where the frame has a pose, by what is believed or known by now.
+  using ReadoutAt = std::function<ReadoutMotion(const Pose& cam_from_world)>;
+  void set_readout(ReadoutAt readout) { readout_ = std::move(readout); }
+  ReadoutMotion ReadoutOf(const Pose& cam_from_world) const {
+    return readout_ ? readout_(cam_from_world) : ReadoutMotion();
+  }
   // The image, as long as not all of its features are known; null after that, and where there is none.
   const cv::Mat* image() const { return grey_ && !query_ ? &*grey_ : nullptr; }
   const Camera& camera() const { return camera_; }
@@ -180,6 +186,7 @@ class QueryFrame {
   Features features_;
   Camera camera_;
   std::optional<SensedUp> up_;
+  ReadoutAt readout_;
   std::shared_ptr<const Query> query_;  // with all features
 };
 

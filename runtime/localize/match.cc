@@ -103,7 +103,7 @@ class GuidedSearch {
     for (size_t k = 0; k < landmarks.idx.size(); ++k) {
       const MapLandmark& landmark = landmarks.landmarks[k];
       const Eigen::Vector3d point = cam_from_world * landmark.position;
-      if (const auto pixel = ImageFromCamera(query.camera, point)) {
+      if (const auto pixel = PixelOf(query, point)) {
         projected_.push_back(
             {k, *pixel, DepthOfScale(query.camera, point),
              std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px)});

@@ -6,6 +6,7 @@
 
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/localization.h"
+#include "runtime/localize/refine.h"
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {
@@ -44,7 +45,22 @@ std::vector<std::optional<QueryRay>> RaysOf(const std::vector<Keypoint>& keypoin
 
 bool IsIdentity(const Pose& pose) { return pose.translation.isZero(0) && pose.rotation.vec().isZero(0); }
 
+// Of the motion while the image is read, from the middle row to this one.
+double ReadoutPart(const Query& query, double row) { return row / query.camera.height - 0.5; }
+
 }  // namespace
+
+std::optional<Eigen::Vector2d> PixelOf(const Query& query, const Eigen::Vector3d& in_camera) {
+  std::optional<Eigen::Vector2d> pixel = ImageFromCamera(query.camera, in_camera);
+  if (query.readout.motion.isZero(0)) return pixel;
+  // The row says when, and when says the row: two rounds leave nothing where a row is read in far less time
+  // than the point takes to move by one.
+  for (int round = 0; round < 2 && pixel; ++round) {
+    const Pose moved = Perturb(Pose(), ReadoutPart(query, pixel->y()) * query.readout.motion);
+    pixel = ImageFromCamera(query.camera, moved * in_camera);
+  }
+  return pixel;
+}
 
 OptionTable DescribeOptions(MeasurementOptions* o) {
   return {{.name = "keypoint_sigma_px",
@@ -140,9 +156,16 @@ std::vector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const La
   for (const Correspondence& correspondence : correspondences) {
     const MapLandmark& landmark = landmarks.Find(correspondence.landmark);
     const Query& query = sighting.images[correspondence.image];
-    PoseMeasurement measurement{landmark.position, landmark.covariance, *query.rays[correspondence.keypoint],
-                                correspondence.image, std::nullopt};
+    PoseMeasurement measurement{.point = landmark.position,
+                                .point_covariance = landmark.covariance,
+                                .ray = *query.rays[correspondence.keypoint],
+                                .image = correspondence.image};
     if (!IsIdentity(query.cam_from_rig)) measurement.cam_from_rig = query.cam_from_rig;
+    if (!query.readout.is_none()) {
+      const double part = ReadoutPart(query, query.features.keypoints[correspondence.keypoint].y);
+      measurement.cam_from_rig = Perturb(query.cam_from_rig, part * query.readout.motion);
+      measurement.row = {part, query.readout.sigmas};
+    }
     measurements.push_back(std::move(measurement));
   }
   return measurements;

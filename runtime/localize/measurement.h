@@ -13,6 +13,7 @@
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
 #include "core/geometry/pose.h"
+#include "runtime/localize/localization.h"
 #include "runtime/localize/localizer_options.h"
 
 namespace cairn {
@@ -57,8 +58,13 @@ struct Query {
   double min_scale_px = 0;
   // These in frames of the map's cameras (MapHead::camera_from_given).
   std::optional<UpMeasurement> up;
-  Pose cam_from_rig;  // of a camera of a rig, whose frame `up` is in then
+  Pose cam_from_rig;      // of a camera of a rig, whose frame `up` is in then
+  ReadoutMotion readout;  // poses are those of the middle row
 };
+
+// Where a point of the camera's frame in the middle row's moment is seen, in the image or not; as
+// ImageFromCamera.
+std::optional<Eigen::Vector2d> PixelOf(const Query& query, const Eigen::Vector3d& in_camera);
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options);
 // More features of the same image, behind those that the query has.  They are found by guided matching
 // alone: they are not packed.
@@ -98,6 +104,13 @@ struct PoseMeasurement {
   QueryRay ray;
   int image = 0;
   std::optional<Pose> cam_from_rig;  // none: the rig's frame is the camera's
+  // Of an image that is read row by row: cam_from_rig is that of the keypoint's row.  Which part of the
+  // motion lies between the middle row and it, and what is not known of all of the motion.
+  struct Row {
+    double part = 0;
+    Vector6d motion_sigmas = Vector6d::Zero();
+  };
+  std::optional<Row> row;
 
   Eigen::Vector3d InCamera(const Eigen::Vector3d& in_rig) const {
     return cam_from_rig ? *cam_from_rig * in_rig : in_rig;

@@ -66,6 +66,10 @@ struct NormalEquations {
   double cost = 0;
   int num_points = 0;
   std::vector<Eigen::Matrix2d> informations;  // per measurement; zero behind the camera
+  // Of images that are read row by row: how an error of the motion while that goes on moves the gradient, and
+  // its standard deviations.
+  Matrix6d of_readout = Matrix6d::Zero();
+  Vector6d readout_sigmas = Vector6d::Zero();
 };
 
 double Cauchy(double squared, double scale) {
@@ -122,6 +126,10 @@ NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measure
     equations.cost += Cauchy(squared, scale);
     equations.informations[i] = information;
     ++equations.num_points;
+    if (const auto& row = measurements[i].row) {
+      equations.of_readout += row->part * weighted * linearised->jacobian;
+      equations.readout_sigmas = row->motion_sigmas;
+    }
   }
   return equations;
 }
@@ -334,6 +342,8 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     return std::nullopt;
   refined.cam_from_world = *pose;
   refined.covariance = unit * factors.solve(Matrix6d::Identity());
+  const Matrix6d of_readout = factors.solve(equations.of_readout) * equations.readout_sigmas.asDiagonal();
+  refined.covariance += of_readout * of_readout.transpose();
   refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
   AddSystematic(options, &refined.covariance);
   if (!refined.covariance.allFinite()) return std::nullopt;

@@ -12,8 +12,6 @@
 
 namespace cairn {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-
 // exp of a perturbation xi = (rotation in rad, translation in m), applied from the left:
 // cam_from_world' = (Exp(rotation), translation) * cam_from_world.
 Pose Perturb(const Pose& cam_from_world, const Vector6d& xi);

@@ -69,7 +69,7 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
   const double focal_px = coarse.camera.MeanFocal();
   for (const MapLandmark& landmark : landmarks.landmarks) {
     const Eigen::Vector3d point = cam_from_world * landmark.position;
-    const auto pixel = ImageFromCamera(coarse.camera, point);
+    const auto pixel = PixelOf(coarse, point);
     if (!pixel || !IsInImage(*pixel, coarse.camera)) continue;
     const double pixels_per_m = focal_px / DepthOfScale(coarse.camera, point);
     const double scale_px = landmark.scale_m * pixels_per_m;
@@ -86,10 +86,9 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
 
 }  // namespace
 
-Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const cv::Mat& grey,
-                                      const Camera& camera, const std::vector<LandmarkIdx>& expected,
-                                      const PosePrior& prior, const ExpectedFeaturesOptions& options,
-                                      const std::optional<SensedUp>& up) {
+Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const QueryFrame& frame,
+                                      const std::vector<LandmarkIdx>& expected, const PosePrior& prior,
+                                      const ExpectedFeaturesOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(expected, false));
   const auto num_of_unknown_size =
       std::count_if(landmarks->landmarks.begin(), landmarks->landmarks.end(),
@@ -99,8 +98,9 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                         .message = fmt::format("of {} of {} landmarks the size is not known",
                                                num_of_unknown_size, expected.size())};
   }
-  CAIRN_ASSIGN_OR_RETURN(Query query, localizer.CoarseQueryFromImage(grey, camera));
-  if (up) CAIRN_RETURN_IF_ERROR(localizer.SetUp(*up, &query));
+  CAIRN_ASSIGN_OR_RETURN(Query query, localizer.CoarseQueryFromImage(*frame.image(), frame.camera()));
+  if (frame.up()) CAIRN_RETURN_IF_ERROR(localizer.SetUp(*frame.up(), &query));
+  query.readout = frame.ReadoutOf(prior.cam_from_world);
   const int num_features = static_cast<int>(query.features.keypoints.size());
   if (num_features < localizer.options().accept.min_num_features) {
     return Localization{.reason = NoFix::kTooFewFeatures,
@@ -113,10 +113,11 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
       localizer.LocalizeAmong(query, Scope::kTrack,
                               CoarseOf(*landmarks, camera_from_given * prior.cam_from_world, query), prior));
   if (!found.has_fix() || options.max_num_fine_features == 0) return found;
+  query.readout = frame.ReadoutOf(found.cam_from_world);
   const std::vector<ExpectedSight> sights =
       FineSights(*landmarks, found, camera_from_given, query, options.fine_radius_px);
   CAIRN_RETURN_IF_ERROR(localizer.AddFineFeatures(
-      grey, options.max_num_fine_features,
+      *frame.image(), options.max_num_fine_features,
       [&](const Keypoint& keypoint) {
         return IsLikeAny(keypoint, sights, kMaxRadii * options.fine_radius_px);
       },

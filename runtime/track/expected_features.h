@@ -1,11 +1,7 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
-#include <opencv2/core/mat.hpp>
-
-#include "core/camera/camera.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
 #include "runtime/track/region_tracker.h"
@@ -16,9 +12,9 @@ namespace cairn {
 // the places of the landmarks.  The coarse ones, which the whole image is searched for, are accepted or
 // refused as all features of an image would be, by what those of their scales show; fine ones make the fix
 // more exact.  No fix where half of the landmarks' sizes are not known.  Errors: as Localizer::Localize.
-Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const cv::Mat& grey,
-                                      const Camera& camera, const std::vector<LandmarkIdx>& expected,
-                                      const PosePrior& prior, const ExpectedFeaturesOptions& options,
-                                      const std::optional<SensedUp>& up = std::nullopt);
+// REQUIRES: frame.image()
+Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const QueryFrame& frame,
+                                      const std::vector<LandmarkIdx>& expected, const PosePrior& prior,
+                                      const ExpectedFeaturesOptions& options);
 
 }  // namespace cairn

@@ -44,6 +44,12 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .value = &o->max_num_neighbour_regions,
        .help = "most regions besides its own whose landmarks are looked for",
        .min = 0},
+      {.name = "readout_ratio",
+       .value = &o->readout_ratio,
+       .help = "rolling shutter: part of the time from frame to frame in which an image is read, top row "
+               "first; 0: all rows at once",
+       .min = 0,
+       .max = 1},
       {.name = "map_guided",
        .value = &o->features.map_guided,
        .help = "look for features of the scales and in the places that the map expects, while the camera is "
@@ -102,12 +108,14 @@ Result<Localization> RegionTracker::TrackFrame(QueryFrame* frame) {
   return WithoutExceptions("track", [&]() -> Result<Localization> {
     if (up_) frame->set_up(*std::exchange(up_, std::nullopt));
     const std::optional<PosePrior> prior = Prediction();
+    if (prior && options_.readout_ratio > 0)
+      frame->set_readout([this](const Pose& pose) { return ReadoutOf(pose); });
     if (prior && frame->image() != nullptr && options_.features.map_guided) {
       CAIRN_ASSIGN_OR_RETURN(const auto found, TrackExpected(*frame, *prior));
       if (found) return *found;
     }
     CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
-    return TrackQuery(*query, prior);
+    return TrackQuery(*frame, *query, prior);
   });
 }
 
@@ -169,32 +177,53 @@ Result<std::optional<Localization>> RegionTracker::TrackExpected(const QueryFram
   const Camera& camera = frame.camera();
   CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
   CAIRN_ASSIGN_OR_RETURN(const auto expected, ExpectedLandmarks(prior, AsFound(map_->head(), camera)));
-  CAIRN_ASSIGN_OR_RETURN(Localization found,
-                         LocalizeExpected(*map_, expecting_localizer_, *frame.image(), camera, expected,
-                                          prior, options_.features, frame.up()));
+  CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeExpected(*map_, expecting_localizer_, frame, expected,
+                                                              prior, options_.features));
   if (!found.has_fix() || !Agrees(found, prior)) return std::optional<Localization>();
   Update(found);
   return std::optional(std::move(found));
 }
 
-Result<Localization> RegionTracker::TrackQuery(const Query& query, const std::optional<PosePrior>& prior) {
+Result<Localization> RegionTracker::TrackQuery(const QueryFrame& frame, const Query& query,
+                                               const std::optional<PosePrior>& prior) {
   const bool has_features =
       static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
   // [Sala06 §III] inside a region its features are tracked; here those of its neighbours too
   if (has_features && prior) {
     CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
-    CAIRN_ASSIGN_OR_RETURN(Localization found,
-                           localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior));
+    CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeByRows(frame, query, std::move(expected), *prior));
     if (found.has_fix() && Agrees(found, *prior)) {
       Update(found);
       return found;
     }
   }
   // [Sala06 §III] a region whose features are not all visible was left: the visible ones vote
+  std::optional<Query> by_rows;  // each where nobody knows how the camera moved
+  if (options_.readout_ratio > 0) {
+    by_rows = query;
+    by_rows->readout = UnknownReadout();
+  }
+  const Query& lost = by_rows ? *by_rows : query;
   CAIRN_ASSIGN_OR_RETURN(Localization found,
-                         has_features ? FindLost(query) : localizer_.LocalizeQuery(query, std::nullopt));
+                         has_features ? FindLost(lost) : localizer_.LocalizeQuery(lost, std::nullopt));
   Update(found);
   return found;
+}
+
+Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, const Query& query,
+                                                   std::vector<LandmarkIdx> expected,
+                                                   const PosePrior& prior) const {
+  if (options_.readout_ratio == 0)
+    return localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior);
+  Query by_rows = query;
+  by_rows.readout = frame.ReadoutOf(prior.cam_from_world);
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map_->Gather(expected, false));
+  CAIRN_ASSIGN_OR_RETURN(Localization found,
+                         localizer_.LocalizeAmong(by_rows, Scope::kTrack, std::move(expected), prior));
+  if (!found.has_fix()) return found;
+  // Now it is known how it moved.
+  by_rows.readout = frame.ReadoutOf(found.cam_from_world);
+  return localizer_.Sharpen(by_rows, *landmarks, std::move(found));
 }
 
 Result<Localization> RegionTracker::FindLost(const Query& query) const {
@@ -273,9 +302,31 @@ bool RegionTracker::Agrees(const Localization& found, const PosePrior& prior) co
              options_.max_num_sigmas * prior.sigma_deg;
 }
 
+ReadoutMotion RegionTracker::ReadoutOf(const Pose& given_cam_from_world) const {
+  if (!at_last_frame_) return UnknownReadout();
+  const Pose cam_from_world = map_->head().camera_from_given * given_cam_from_world;
+  const Vector6d step = PerturbationBetween(*at_last_frame_, cam_from_world);
+  if (!knows_step_) return {options_.readout_ratio * step, options_.readout_ratio * step.cwiseAbs()};
+  // That is how fast it was half a frame ago, by as much faster than a frame before as it may be now.
+  const Vector6d faster = 0.5 * (step - PerturbationBetween(Pose(), step_));
+  return {options_.readout_ratio * (step + faster), options_.readout_ratio * faster.cwiseAbs()};
+}
+
+ReadoutMotion RegionTracker::UnknownReadout() const {
+  // What a motion may change by from frame to frame is for the worst of frames.
+  constexpr double kUsualPart = 0.25;
+  ReadoutMotion readout;
+  readout.sigmas.head<3>().setConstant(RadFromDeg(options_.step_sigma_deg));
+  readout.sigmas.tail<3>().setConstant(options_.step_sigma_m);
+  readout.sigmas *= kUsualPart * options_.readout_ratio;
+  return readout;
+}
+
 void RegionTracker::Update(const Localization& found) {
   if (!found.has_fix()) {
     motion_ = MotionToNext();
+    at_last_frame_ = motion_ ? std::optional(motion_->cam_from_world()) : std::nullopt;
+    knows_step_ = false;
     was_told_ = false;
     ++num_frames_since_;
     return;
@@ -284,7 +335,9 @@ void RegionTracker::Update(const Localization& found) {
   const Pose cam_from_world = camera_from_given * found.cam_from_world;
   const bool is_next = found.scope == Scope::kTrack && num_frames_since_ == 0;
   step_ = is_next ? cam_from_world * last_.Inverse() : Pose();
+  knows_step_ = is_next;
   last_ = cam_from_world;
+  at_last_frame_ = cam_from_world;
   motion_.emplace(cam_from_world, TransformCovariance(camera_from_given, found.covariance));
   was_told_ = false;
   region_ = found.region;

@@ -34,6 +34,10 @@ struct RegionTrackerOptions {
   double min_prior_sigma_m = 0.05;
   double min_prior_sigma_deg = 2;
   WheelErrorOptions wheels;
+  // Of the time from one frame to the next, the part that a camera with a rolling shutter takes to read an
+  // image, top row first: while it is followed, each row is seen from where the camera was then.  0: all rows
+  // at once.  REQUIRES: in [0, 1]
+  double readout_ratio = 0;
   // A tracked fix lies within this many standard deviations of the prediction.  REQUIRES: > 0
   double max_num_sigmas = 4;
   // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
@@ -84,7 +88,11 @@ class RegionTracker {
   std::optional<UncertainPose> Believed() const;
 
  private:
-  Result<Localization> TrackQuery(const Query& query, const std::optional<PosePrior>& prior);
+  Result<Localization> TrackQuery(const QueryFrame& frame, const Query& query,
+                                  const std::optional<PosePrior>& prior);
+  // Among these landmarks, with each row where it was read.
+  Result<Localization> LocalizeByRows(const QueryFrame& frame, const Query& query,
+                                      std::vector<LandmarkIdx> expected, const PosePrior& prior) const;
   // Found by the prediction, without the features of all of the image; nothing if not.
   Result<std::optional<Localization>> TrackExpected(const QueryFrame& frame, const PosePrior& prior);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
@@ -96,18 +104,23 @@ class RegionTracker {
   // With the step to the next frame, where nobody told it.
   std::optional<MotionSinceFix> MotionToNext() const;
   void Update(const Localization& found);
+  // Of the next frame, if this is its pose (as it is given), by how the camera moved until then.
+  ReadoutMotion ReadoutOf(const Pose& given_cam_from_world) const;
+  ReadoutMotion UnknownReadout() const;
 
   std::shared_ptr<const Map> map_;
   Localizer localizer_;
   Localizer expecting_localizer_;  // where landmarks are expected
   RegionTrackerOptions options_;
-  Pose last_, step_;  // of the last fix; from each frame's camera to the next one's
+  Pose last_, step_;         // of the last fix; from each frame's camera to the next one's
+  bool knows_step_ = false;  // by the last two frames
   RegionIdx region_ = -1;
   // Since the last fix.  These are of the map's camera frame.
   std::optional<MotionSinceFix> motion_;
   bool was_told_ = false;  // how it moved since the last frame
   std::optional<SensedUp> up_;
-  int num_frames_since_ = 0;  // the last fix
+  std::optional<Pose> at_last_frame_;  // as far as it was known
+  int num_frames_since_ = 0;           // the last fix
 };
 
 }  // namespace cairn

@@ -78,6 +78,10 @@ OptionTable DescribeOptions(SimulateOptions* o) {
        1},
       {"image_noise", &o->image_noise, "Standard deviation of grey noise in survey images, of 255", 0, 50},
       {"jpeg_quality", &o->jpeg_quality, "Quality of the JPEG files", 1, 100},
+      {"readout_ratio", &o->readout_ratio,
+       "Rolling shutter: part of the time from one image of a driven survey to the next in which it is read, "
+       "row by row from the top",
+       0, 1},
       {"rig_num_cameras", &o->rig_num_cameras,
        "Cameras of the rig that takes the queries and the images of a driven survey, evenly turned about an "
        "upright axis: camera k's images are in a folder camK",
@@ -99,7 +103,7 @@ OptionTable DescribeOptions(SimulateOptions* o) {
   };
   AddCondition({"survey", {"lattice"}}, {"spacing_m", "num_headings", "survey_area_m", "query_headings"},
                &table);
-  AddCondition({"survey", {"driven"}}, {"step_m", "max_turn_deg"}, &table);
+  AddCondition({"survey", {"driven"}}, {"step_m", "max_turn_deg", "readout_ratio"}, &table);
   AddCondition({"camera_model", {"EQUIRECTANGULAR"}}, {"panorama_width_px"}, &table);
   AddCondition({"camera_model", {"PINHOLE", "OPENCV_FISHEYE"}}, {"num_headings"}, &table);
   AddCondition({"rig_num_cameras", {"not 1"}}, {"rig_radius_m"}, &table);

@@ -112,6 +112,9 @@ struct SimulateOptions {
   double light_ratio = 1;
   // Of all image files.  REQUIRES: in [1, 100]
   int jpeg_quality = 95;
+  // Part of the time from one image of a driven survey to the next in which it is read, row by row from the
+  // top: a rolling shutter.  REQUIRES: in [0, 1]
+  double readout_ratio = 0;
   // Cameras of the rig that takes the queries and the images of a driven survey, evenly turned about an
   // upright axis, rig_radius_m from it; the first looks ahead.  REQUIRES: in [1, 16] and [0, 2]
   int rig_num_cameras = 1;

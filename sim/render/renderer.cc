@@ -67,9 +67,18 @@ Renderer::Renderer(const Building& building, const Camera& camera)
 }
 
 cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
+  return RenderFloat([&](int) { return cam_from_world; });
+}
+
+cv::Mat Renderer::RenderFloat(const std::function<Pose(int)>& cam_from_world) const {
   const int width = camera_.width, height = camera_.height;
-  const Eigen::Vector3d origin = cam_from_world.Center();
-  const Eigen::Matrix3d world_from_cam = cam_from_world.rotation.toRotationMatrix().transpose();
+  std::vector<Eigen::Vector3d> origins;
+  std::vector<Eigen::Matrix3d> world_from_cams;
+  for (int y = 0; y < height; ++y) {
+    const Pose pose = cam_from_world(y);
+    origins.push_back(pose.Center());
+    world_from_cams.push_back(pose.rotation.toRotationMatrix().transpose());
+  }
   const auto ray_at = [&](int x, int y) { return rays_[static_cast<size_t>(y) * width + x]; };
   // Ray of a pixel and its change per pixel, in the world frame.
   struct SteppedRay {
@@ -83,10 +92,10 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
     if (is_inside(x + dx, y + dy)) change = ray_at(x + dx, y + dy) - ray_at(x, y);
     if (!change.allFinite() && is_inside(x - dx, y - dy)) change = ray_at(x, y) - ray_at(x - dx, y - dy);
     if (!change.allFinite()) change.setZero();
-    return Eigen::Vector3d(world_from_cam * change.cast<double>());
+    return Eigen::Vector3d(world_from_cams[y] * change.cast<double>());
   };
   const auto pixel_ray = [&](int x, int y) {
-    return SteppedRay{world_from_cam * ray_at(x, y).cast<double>(), step(x, y, 1, 0), step(x, y, 0, 1)};
+    return SteppedRay{world_from_cams[y] * ray_at(x, y).cast<double>(), step(x, y, 1, 0), step(x, y, 0, 1)};
   };
 
   cv::Mat image(height, width, CV_32FC1);
@@ -96,7 +105,7 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
       const SteppedRay pixel = pixel_ray(x, y);
       Shade shade;
       if (std::isfinite(pixel.ray.x()))
-        shade = TraceRay(building_, origin, pixel.ray, pixel.step_x, pixel.step_y);
+        shade = TraceRay(building_, origins[y], pixel.ray, pixel.step_x, pixel.step_y);
       image.at<float>(y, x) = shade.value;
       faces.at<int>(y, x) = shade.face;
     }
@@ -115,8 +124,8 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
       for (int j = 0; j < kEdgeSamples; ++j) {
         for (int i = 0; i < kEdgeSamples; ++i) {
           const double right = i - 0.5 * (kEdgeSamples - 1), down = j - 0.5 * (kEdgeSamples - 1);
-          sum +=
-              TraceRay(building_, origin, pixel.ray + right * step_x + down * step_y, step_x, step_y).value;
+          sum += TraceRay(building_, origins[y], pixel.ray + right * step_x + down * step_y, step_x, step_y)
+                     .value;
         }
       }
       image.at<float>(y, x) = sum / (kEdgeSamples * kEdgeSamples);

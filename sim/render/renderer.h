@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,8 @@ class Renderer {
   cv::Mat Render(const Pose& cam_from_world) const;
   // The same before rounding, CV_32FC1 in [0, 255]: for adding exposure, noise and blur.
   cv::Mat RenderFloat(const Pose& cam_from_world) const;
+  // The same with each row seen from a pose of its own, as a rolling shutter does.
+  cv::Mat RenderFloat(const std::function<Pose(int row)>& cam_from_world) const;
 
   const Camera& camera() const { return camera_; }
 

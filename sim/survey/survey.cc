@@ -217,6 +217,19 @@ Camera MakeFisheye(const SimulateOptions& options) {
   return camera;
 }
 
+// Images along a way are read in this part of the time from one to the next, while the camera moves as fast
+// as from the one before to the one after.
+void ReadByRows(double readout_ratio, std::vector<PlannedImage>* images) {
+  for (size_t i = 0; i < images->size(); ++i) {
+    const size_t before = i == 0 ? 0 : i - 1, after = std::min(i + 1, images->size() - 1);
+    const Pose motion = (*images)[after].cam_from_world * (*images)[before].cam_from_world.Inverse();
+    const double part = readout_ratio / static_cast<double>(std::max<size_t>(1, after - before));
+    const Eigen::AngleAxisd turn(motion.rotation);
+    (*images)[i].readout_turn = part * turn.angle() * turn.axis();
+    (*images)[i].readout_way = part * motion.translation;
+  }
+}
+
 // The first is the rig's origin.
 std::vector<Pose> CamerasOnRig(const SimulateOptions& options) {
   std::vector<Pose> cams_from_rig;
@@ -244,6 +257,9 @@ std::vector<PlannedImage> TakenByRig(const std::vector<PlannedImage>& images,
       image.stated_cam_from_world = cam_from_rig * image.stated_cam_from_world;
       image.turn = cam_from_rig.rotation * image.turn;
       image.way = cam_from_rig.rotation * image.way;
+      image.readout_turn = cam_from_rig.rotation * image.readout_turn;
+      image.readout_way =
+          cam_from_rig.rotation * image.readout_way - image.readout_turn.cross(cam_from_rig.translation);
       taken.push_back(std::move(image));
     }
   }
@@ -297,6 +313,7 @@ Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& optio
   survey.query_camera = MakeQueryCamera(options);
   std::vector<double> headings;  // of a driven survey's stations
   CAIRN_RETURN_IF_ERROR(AddSurveyImages(building, options, seed, &headings, &survey));
+  if (options.readout_ratio > 0) ReadByRows(options.readout_ratio, &survey.images);
   CAIRN_RETURN_IF_ERROR(AddQueries(building, options, seed, headings, &survey));
   survey.cams_from_rig = CamerasOnRig(options);
   if (options.rig_num_cameras > 1) {
@@ -314,7 +331,14 @@ cv::Mat TakeImage(const Renderer& renderer, const PlannedImage& image, uint64_t 
   const auto render = [&](double part) {
     Pose moved = image.cam_from_world;
     moved.translation -= part * image.way;
-    return renderer.RenderFloat(RotatedInCamera(moved, part * image.turn));
+    moved = RotatedInCamera(moved, part * image.turn);
+    if (image.readout_turn.isZero(0) && image.readout_way.isZero(0)) return renderer.RenderFloat(moved);
+    return renderer.RenderFloat([&](int row) {
+      const double of_readout = (row + 0.5) / renderer.camera().height - 0.5;
+      Pose at_row = RotatedInCamera(moved, of_readout * image.readout_turn);
+      at_row.translation += of_readout * image.readout_way;
+      return at_row;
+    });
   };
   cv::Mat sum = render(0.5 / num_exposures - 0.5);
   for (int i = 1; i < num_exposures; ++i) sum += render((i + 0.5) / num_exposures - 0.5);

@@ -25,6 +25,10 @@ struct PlannedImage {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();
   // The camera's way during the exposure, camera frame in the middle of it, metres.
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  // A rolling shutter: from the top row to the bottom row the pose goes on by this much, from the left, axis
+  // times angle (rad) and metres; cam_from_world is that of the middle row.
+  Eigen::Vector3d readout_turn = Eigen::Vector3d::Zero();
+  Eigen::Vector3d readout_way = Eigen::Vector3d::Zero();
 };
 
 struct Survey {

@@ -44,7 +44,8 @@ Result<Localization> FindExpected(const cv::Mat& grey, const Camera& camera,
   prior.sigma_m = 0.1;
   prior.sigma_deg = 2;
   const Localizer localizer(PosterMap(), PosterOptions());
-  return LocalizeExpected(*PosterMap(), localizer, grey, camera, AllOf(*PosterMap()), prior, options);
+  return LocalizeExpected(*PosterMap(), localizer, QueryFrame(localizer, grey, camera), AllOf(*PosterMap()),
+                          prior, options);
 }
 
 TEST(LocalizeExpected, FindsAnImageByAPartOfItsFeatures) {
@@ -148,10 +149,10 @@ TEST(LocalizeExpected, LandmarksOfUncertainPlaceAreLookedForFartherAway) {
   const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
   PosePrior prior;
   prior.cam_from_world = PosterQueryPose();
-  const auto coarse = *LocalizeExpected(*map, localizer, grey, Poster().camera, AllOf(*map), prior,
-                                        {.max_num_fine_features = 0}),
-             fine = *LocalizeExpected(*map, localizer, grey, Poster().camera, AllOf(*map), prior,
-                                      {.max_num_fine_features = 100000});
+  const auto coarse = *LocalizeExpected(*map, localizer, QueryFrame(localizer, grey, Poster().camera),
+                                        AllOf(*map), prior, {.max_num_fine_features = 0}),
+             fine = *LocalizeExpected(*map, localizer, QueryFrame(localizer, grey, Poster().camera),
+                                      AllOf(*map), prior, {.max_num_fine_features = 100000});
   ASSERT_TRUE(coarse.has_fix()) << coarse.message;
   const int num_near = NumFineFeaturesNear(*map, grey, coarse, 3);
   EXPECT_EQ(fine.num_features - coarse.num_features, num_near);
@@ -175,8 +176,9 @@ TEST(LocalizeExpected, LandmarksOfUnknownSizeAreNotExpected) {
   const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
   PosePrior prior;
   prior.cam_from_world = PosterQueryPose();
+  const Localizer localizer(map, PosterOptions());
   const auto found =
-      LocalizeExpected(*map, Localizer(map, PosterOptions()), grey, Poster().camera, AllOf(*map), prior, {});
+      LocalizeExpected(*map, localizer, QueryFrame(localizer, grey, Poster().camera), AllOf(*map), prior, {});
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(found->reason, NoFix::kTooFewMatches);
   EXPECT_THAT(found->message, testing::HasSubstr("size is not known"));

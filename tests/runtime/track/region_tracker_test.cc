@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/localize/refine.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
 #include "runtime/track/region_votes.h"
@@ -27,6 +28,14 @@ TEST(RegionTracker, FollowsADriveByItsPrediction) {
   }
 }
 
+// How far the walls are along a ray of the camera's, metres: landmarks lie up to 0.3 m before them.
+double WallDistance(const Pose& cam_from_world, const Eigen::Vector3d& ray) {
+  const Eigen::Vector3d from = cam_from_world.Center(), along = cam_from_world.rotation.conjugate() * ray;
+  const double to_x = (std::copysign(4.85, along.x()) - from.x()) / along.x();
+  const double to_y = (std::copysign(3.85, along.y()) - from.y()) / along.y();
+  return std::min(to_x, to_y);
+}
+
 TEST(RegionTracker, PredictsConstantVelocity) {
   RegionTracker tracker(RoomMap());
   ASSERT_TRUE(Show(tracker, OnDrive(0), 0)->has_fix());
@@ -36,6 +45,46 @@ TEST(RegionTracker, PredictsConstantVelocity) {
   EXPECT_LT(CenterErrorM(tracker.Prediction()->cam_from_world, OnDrive(2)), 0.08);
   EXPECT_LT(RotationErrorDeg(tracker.Prediction()->cam_from_world, OnDrive(2)), 1);
   EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_m, RegionTrackerOptions().step_sigma_m);
+}
+
+// Frame i of the drive as a rolling shutter sees it, read in such a part of the time between frames.
+Features ReadByRows(int i, double readout_ratio, const RenderOptions& options) {
+  const Vector6d step = PerturbationBetween(OnDrive(i), OnDrive(i + 1));
+  Features features = RenderFeatures(Room(), OnDrive(i), options, i);
+  // Each keypoint moves by how the middle of the room's walls, 4 m ahead, does until its row is read.
+  for (Keypoint& keypoint : features.keypoints) {
+    const auto ray = BearingFromImage(Room().camera, {keypoint.x, keypoint.y});
+    const Eigen::Vector3d world =
+        OnDrive(i).Inverse() * Eigen::Vector3d(*ray * WallDistance(OnDrive(i), *ray));
+    Eigen::Vector2d pixel(keypoint.x, keypoint.y);
+    for (int round = 0; round < 5; ++round) {
+      const double part = pixel.y() / Room().camera.height - 0.5;
+      pixel = *ImageFromCamera(Room().camera, Perturb(OnDrive(i), readout_ratio * part * step) * world);
+    }
+    keypoint.x = static_cast<float>(pixel.x());
+    keypoint.y = static_cast<float>(pixel.y());
+  }
+  return features;
+}
+
+TEST(RegionTracker, KnowsWhenEachRowWasRead) {
+  const RenderOptions exact{.keypoint_sigma_px = 0.2, .keypoint_sigma_per_scale = 0.05};
+  RegionTracker rolling(RoomMap(), {}, {.readout_ratio = 0.7}), global(RoomMap());
+  double sum_rolling = 0, sum_global = 0;
+  constexpr int kNumFrames = 40;
+  for (int i = 0; i < kNumFrames; ++i) {
+    const Features features = ReadByRows(i, 0.7, exact);
+    const auto by_rows = *rolling.TrackFeatures(features, Room().camera);
+    const auto at_once = *global.TrackFeatures(features, Room().camera);
+    ASSERT_TRUE(by_rows.has_fix()) << i << ": " << by_rows.message;
+    if (i < 2) continue;  // how fast it moves is not known yet
+    EXPECT_EQ(by_rows.scope, Scope::kTrack) << i;
+    sum_rolling += CenterErrorM(by_rows.cam_from_world, OnDrive(i));
+    sum_global += at_once.has_fix() ? CenterErrorM(at_once.cam_from_world, OnDrive(i)) : 0;
+    if (at_once.has_fix()) EXPECT_GE(by_rows.num_inliers, at_once.num_inliers - 10) << i;
+  }
+  EXPECT_LT(sum_rolling / kNumFrames, 0.01);
+  EXPECT_LT(sum_rolling, 0.3 * sum_global);
 }
 
 TEST(RegionTracker, GoesOnAfterBlankFramesUntilItIsLost) {
