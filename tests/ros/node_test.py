@@ -23,6 +23,7 @@ MAP = sys.argv[4] if len(sys.argv) > 4 else str(POSTER / "poster.cairn")
 PICTURES = sys.argv[5:] or [str(POSTER / "poster.pgm")]
 IS_POSTER = len(sys.argv) <= 4
 RATE_HZ = 10
+LEVEL = "_camera_in_robot:=[0, 0, 1, -0.5, 0.5, -0.5, 0.5]"  # looks ahead
 
 
 def free_port():
@@ -51,7 +52,7 @@ import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Twist  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from sensor_msgs.msg import Image, PointCloud  # noqa: E402
+from sensor_msgs.msg import Image, Imu, PointCloud  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 
@@ -245,14 +246,14 @@ class Node(unittest.TestCase):
         """A node of the room of tests/install/poster_room.h, or of another map, with topics of its own, and what it says."""
 
         def __init__(self, test, name, *arguments, map="room"):
-            topics = ("image", "goal", "odom", "cmd_vel", "next", "verdict", "places", "pose", "starts", "way", "progress")
+            topics = ("image", "goal", "odom", "imu", "cmd_vel", "next", "verdict", "places", "pose", "starts", "way", "progress")
             self.node = test.start(f"__name:={name}", f"_map:={POSTER / map}.cairn", "_diagnostics_period_s:=0",
                                    f"/diagnostics:={name}_diagnostics", *[f"{topic}:={name}_{topic}" for topic in topics], *arguments)
             test.addCleanup(self.node.wait)
             test.addCleanup(self.node.terminate)
             self.test, self.said, self.stamp = test, {}, rospy.Time.from_sec(time.time())
             self.publishers = {topic: rospy.Publisher(f"{name}_{topic}", kind, queue_size=10)
-                               for topic, kind in (("image", Image), ("goal", String), ("odom", Odometry), ("progress", String))}
+                               for topic, kind in (("image", Image), ("goal", String), ("odom", Odometry), ("imu", Imu), ("progress", String))}
             # A robot that is not steered has no cmd_vel to listen to, one without ~where no places.
             self.subscribers = [rospy.Subscriber(f"{name}_{topic}", kind, lambda m, topic=topic: self.said.setdefault(topic, []).append(m))
                                 for topic, kind in (("cmd_vel", Twist), ("next", String), ("verdict", String), ("places", PointCloud),
@@ -434,6 +435,35 @@ class Node(unittest.TestCase):
             self.assertEqual(status["reason"], "none")
             self.assertEqual(status["scope"] == "track", has_odometry)
 
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_what_an_imu_contradicts_is_no_fix(self):
+        """By its attitude; by its acceleration where it has none; not while it speeds up."""
+        picture = read_pgm(POSTER / "room0.pgm")
+        for name, follow in (("upright", "true"), ("each", "false")):
+            robot = self.Robot(self, name, "_gravity:=true", LEVEL, f"_follow:={follow}")
+
+            def sense(roll, acceleration=None):
+                message = Imu()
+                message.header.stamp = robot.stamp + rospy.Duration(0.5)
+                message.orientation.x, message.orientation.w = numpy.sin(roll / 2), numpy.cos(roll / 2)
+                if acceleration:
+                    message.orientation_covariance[0] = -1
+                    message.linear_acceleration.x, message.linear_acceleration.y, message.linear_acceleration.z = acceleration
+                robot.publishers["imu"].publish(message)
+                time.sleep(0.1)
+
+            self.assertEqual(robot.show(picture, 0.5)["reason"], "none")  # nothing was said yet
+            sense(0)
+            self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
+            sense(0.5)
+            self.assertNotEqual(robot.show(picture, 0.5)["reason"], "none")
+            sense(0, (0, 0, 9.8))
+            self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
+            sense(0, (0, -6, 7.8))
+            self.assertNotEqual(robot.show(picture, 0.5)["reason"], "none")
+            sense(0, (3, -6, 7.8))  # longer than gravity: nothing is known of up
+            self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
+
     def test_bad_parameters_end_the_node_with_a_sentence(self):
         for number, (arguments, words, code) in enumerate(((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),
@@ -447,7 +477,10 @@ class Node(unittest.TestCase):
                                        ((f"_map:={MAP}", "_steer:=true", "_camera_in_robot:=[0, 0, 1, -0.7071068, 0, 0, 0.7071068]"),
                                         "camera_turn_deg = 90", 2),
                                        ((f"_map:={MAP}", "_where:=true", "_where_period_s:=-1"), "where_period_s is -1", 2),
-                                       ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2))):
+                                       ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2),
+                                       ((f"_map:={MAP}", "_gravity:=true"), "set ~camera_in_robot", 2),
+                                       ((f"_map:={MAP}", "_gravity:=true", LEVEL, "_gravity_sigma_deg:=0"), "gravity_sigma_deg is 0", 2),
+                                       ((f"_map:={MAP}", "_gravity:=true", LEVEL, "_imu_in_robot:=[1]"), "imu_in_robot has 1 numbers", 2))):
             node = self.start(f"__name:=bad{number}", *arguments)  # the master keeps parameters by name
             try:
                 output, _ = node.communicate(timeout=20)

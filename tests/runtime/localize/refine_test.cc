@@ -49,6 +49,68 @@ TEST(Refine, CleanMeasurementsGiveTheTruth) {
   EXPECT_LT(PerturbationBetween(*pose, Truth()).norm(), 1e-8);
 }
 
+TEST(Refine, WhatIsNotKnownOfTheMotionWhileRowsAreReadIsInTheCovariance) {
+  Random random(12);
+  Vector6d sigmas;
+  sigmas << 0.01, 0.02, 0.005, 0.02, 0.01, 0.04;
+  double sum = 0, sum_without = 0;
+  constexpr int kNumTrials = 300;
+  for (int trial = 0; trial < kNumTrials; ++trial) {
+    Vector6d motion;
+    for (int i = 0; i < 6; ++i) motion[i] = random.Normal(0, sigmas[i]);
+    auto measurements = MakeScene(Truth(), 60, 0.5, 0, random);
+    for (PoseMeasurement& measurement : measurements) {
+      // The row is as good as where the point is without the motion.
+      const double part = measurement.ray.ray.y();
+      const Pose moved = Perturb(Truth(), part * motion);
+      measurement.ray.ray +=
+          (moved * measurement.point).hnormalized() - (Truth() * measurement.point).hnormalized();
+      measurement.row = {part, sigmas};
+    }
+    RefineOptions options = kIndependent;
+    options.inlier_chi_square = 1e4;  // motions are larger than the noise
+    const auto refined = RefinePoseWithCovariance(measurements, Truth(), options);
+    ASSERT_TRUE(refined);
+    const Vector6d error = PerturbationBetween(refined->cam_from_world, Truth());
+    sum += error.dot(refined->covariance.inverse() * error);
+    for (PoseMeasurement& measurement : measurements) measurement.row.reset();
+    const auto without = RefinePoseWithCovariance(measurements, Truth(), options);
+    sum_without += error.dot(without->covariance.inverse() * error);
+  }
+  EXPECT_GT(sum_without / kNumTrials, 10);
+  EXPECT_LT(sum / kNumTrials, 7);
+  EXPECT_GT(sum / kNumTrials, 3);  // the noise that is found has a part of the motion, too
+}
+
+TEST(Refine, OfOneCameraOfARigThePoseIsTheRigs) {
+  Random random(3);
+  const Pose cam_from_rig = Perturb(Pose(), (Vector6d() << 0.5, -1, 0.3, 0.2, -0.4, 0.6).finished());
+  auto measurements = MakeScene(cam_from_rig * Truth(), 20, 0, 0, random);
+  for (PoseMeasurement& measurement : measurements) {
+    measurement.ray.sigma_px = 1;
+    measurement.cam_from_rig = cam_from_rig;
+  }
+  const auto pose = RefinePose(measurements, Disturbed(), kIndependent);
+  ASSERT_TRUE(pose);
+  EXPECT_LT(PerturbationBetween(*pose, Truth()).norm(), 1e-8);
+}
+
+TEST(PixelOf, IsWhereTheRowThatIsReadThenSeesThePoint) {
+  Query query;
+  query.camera.model = CameraModel::kSimplePinhole;
+  query.camera.width = 640;
+  query.camera.height = 480;
+  query.camera.params = {500, 320, 240};
+  const Eigen::Vector3d point(0.5, -0.8, 3);
+  EXPECT_EQ(*PixelOf(query, point), *ImageFromCamera(query.camera, point));
+  query.readout.motion << 0.02, -0.03, 0.01, 0.05, 0, -0.1;
+  const Eigen::Vector2d pixel = *PixelOf(query, point);
+  const Pose at_row = Perturb(Pose(), (pixel.y() / 480 - 0.5) * query.readout.motion);
+  EXPECT_LT((*ImageFromCamera(query.camera, at_row * point) - pixel).norm(), 0.05);
+  EXPECT_GT((*ImageFromCamera(query.camera, point) - pixel).norm(), 3);
+  EXPECT_FALSE(PixelOf(query, {0, 0, -1}));
+}
+
 TEST(Refine, OutliersAreLeftOut) {
   Random random(2);
   const auto measurements = MakeScene(Truth(), 100, 0.5, 0.2, random);

@@ -30,6 +30,80 @@ TEST(MakePose, LooksAlongItsHeadingWithTheSkyAbove) {
   EXPECT_LT((rolled.rotation * Eigen::Vector3d::UnitZ()).x(), -0.49);
 }
 
+TEST(PlanSurvey, ADriveReadByRowsGoesOnWhileItIsRead) {
+  SimulateOptions options = QuickOptions();
+  options.survey = "driven";
+  options.readout_ratio = 0.4;
+  const Building building = *MakeBuilding(options, 0);
+  const Survey survey = *PlanSurvey(building, options, 0);
+  ASSERT_GT(survey.images.size(), 10U);
+  for (size_t i = 1; i + 1 < survey.images.size(); ++i) {
+    const PlannedImage& image = survey.images[i];
+    // Twice 0.4 of the mean motion leads from the image before to 0.8 of the way to the one after.
+    const Pose motion = survey.images[i + 1].cam_from_world * survey.images[i - 1].cam_from_world.Inverse();
+    const Eigen::AngleAxisd turn(motion.rotation);
+    EXPECT_LT((image.readout_turn - 0.2 * turn.angle() * turn.axis()).norm(), 1e-9);
+    EXPECT_LT((image.readout_way - 0.2 * motion.translation).norm(), 1e-9);
+  }
+  for (const PlannedImage& query : survey.queries) EXPECT_TRUE(query.readout_way.isZero(0));
+  options.readout_ratio = 0;
+  const Survey at_once = *PlanSurvey(building, options, 0);
+  for (const PlannedImage& image : at_once.images)
+    EXPECT_TRUE(image.readout_turn.isZero(0) && image.readout_way.isZero(0));
+}
+
+TEST(PlanSurvey, ACameraOfARigMovesAsTheRigDoes) {
+  SimulateOptions options = QuickOptions();
+  options.survey = "driven";
+  options.readout_ratio = 0.5;
+  options.rig_num_cameras = 3;
+  options.rig_radius_m = 0.5;
+  const Building building = *MakeBuilding(options, 0);
+  const Survey survey = *PlanSurvey(building, options, 0);
+  const size_t num = survey.images.size() / 3;
+  for (size_t i = 1; i + 1 < num; ++i) {
+    const auto motion = [&](size_t k) {  // while the image is read, small: to first order
+      const PlannedImage& image = survey.images[k * num + i];
+      return Pose{Eigen::Quaterniond(
+                      Eigen::AngleAxisd(1e-4 * image.readout_turn.norm(), image.readout_turn.normalized())),
+                  1e-4 * image.readout_way};
+    };
+    if (survey.images[i].readout_turn.isZero(0)) continue;
+    for (size_t k = 1; k < 3; ++k) {
+      const Pose& cam_from_rig = survey.cams_from_rig[k];
+      const Pose expected = cam_from_rig * motion(0) * cam_from_rig.Inverse();
+      EXPECT_LT((motion(k).translation - expected.translation).norm(), 1e-8);
+      EXPECT_LT(motion(k).rotation.angularDistance(expected.rotation), 1e-7);
+    }
+  }
+}
+
+TEST(TakeImage, EachRowIsSeenFromWhereTheCameraIsThen) {
+  const SimulateOptions options = QuickOptions();
+  const Building building = *MakeBuilding(options, 0);
+  Survey survey = *PlanSurvey(building, options, 0);
+  PlannedImage image = survey.images[3];
+  image.readout_turn = {0.01, -0.08, 0.02};
+  image.readout_way = {0.05, 0, -0.1};
+  const Renderer renderer(building, survey.camera);
+  image.noise = 0;
+  const cv::Mat taken = TakeImage(renderer, image, 0);
+  for (const int row : {0, 120, 239, 360, 479}) {
+    const double part = (row + 0.5) / 480 - 0.5;
+    Pose pose = image.cam_from_world;
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(part * image.readout_turn.norm(), image.readout_turn.normalized()));
+    pose = Pose{turn, part * image.readout_way} * pose;
+    PlannedImage still = image;
+    still.cam_from_world = pose;
+    still.readout_turn.setZero();
+    still.readout_way.setZero();
+    cv::Mat difference;
+    cv::absdiff(taken.row(row), TakeImage(renderer, still, 0).row(row), difference);
+    EXPECT_LT(cv::countNonZero(difference > 2), 10) << row;  // edges know the rows beside
+  }
+}
+
 TEST(PlanSurvey, PutsStationsOnTheLatticeInFreeSpace) {
   const SimulateOptions options = QuickOptions();
   const Building building = *MakeBuilding(options, 0);
