@@ -19,7 +19,8 @@ class Gravity {
 
   // Up in the IMU's frame, of any length, at a time.  One that is earlier than the one before begins anew.
   // Errors: as CheckSensedUp, and InvalidArgument (a time that is not finite).
-  Status Add(double time_s, const Eigen::Vector3d& up_in_imu);
+  // `more_sigma_deg`: of this alone, besides that of the IMU.
+  Status Add(double time_s, const Eigen::Vector3d& up_in_imu, double more_sigma_deg = 0);
   // What was said nearest to an image's time, within a tenth of a second: a robot does not tilt by degrees
   // faster.  0: the last.
   std::optional<SensedUp> At(double image_time_s) const;
@@ -28,6 +29,7 @@ class Gravity {
   struct TimedUp {
     double time_s;
     Eigen::Vector3d up_in_imu;
+    double more_sigma_deg;
   };
 
   Eigen::Quaterniond camera_from_imu_;

@@ -213,12 +213,12 @@ class LocalizerNode {
     bool is_taken = true;
     if (message->orientation_covariance[0] >= 0 && std::abs(norm - 1) < kUnit) {
       is_taken = localizer_->AddUp(stamp_s, 2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x),
-                                   1 - 2 * (q.x * q.x + q.y * q.y));
+                                   1 - 2 * (q.x * q.x + q.y * q.y), false);
     } else {
       const geometry_msgs::Vector3& a = message->linear_acceleration;
       const double length = std::sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
       if (std::abs(length / kGravityMS2 - 1) > kAtRestRatio) return;
-      is_taken = localizer_->AddUp(stamp_s, a.x, a.y, a.z);
+      is_taken = localizer_->AddUp(stamp_s, a.x, a.y, a.z, true);
     }
     if (!is_taken) ROS_ERROR_THROTTLE(10, "an attitude that is not finite does not count");
   }

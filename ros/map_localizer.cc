@@ -313,8 +313,10 @@ bool MapLocalizer::AddOdometry(double stamp_s, double x_m, double y_m, double he
          (!state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, pose).ok());
 }
 
-bool MapLocalizer::AddUp(double stamp_s, double x, double y, double z) {
-  return !state_->gravity || state_->gravity->Add(stamp_s, {x, y, z}).ok();
+bool MapLocalizer::AddUp(double stamp_s, double x, double y, double z, bool is_acceleration) {
+  constexpr double kAccelerationSigmaDeg = 6;
+  return !state_->gravity ||
+         state_->gravity->Add(stamp_s, {x, y, z}, is_acceleration ? kAccelerationSigmaDeg : 0).ok();
 }
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }

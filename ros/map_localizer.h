@@ -128,8 +128,10 @@ class MapLocalizer {
   // Where odometry has the robot: metres, radians to the left, in a frame of its own.  False: not finite.
   bool AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad);
 
-  // Which way is up in an IMU's frame, by what it says.  False: no direction, or not finite.
-  bool AddUp(double stamp_s, double x, double y, double z);
+  // Which way is up in an IMU's frame, by its attitude or by its acceleration, which is up where the robot
+  // does not speed up: by 1 m/s^2 it errs by 6 degrees, and is taken for no better.  False: no direction, or
+  // not finite.
+  bool AddUp(double stamp_s, double x, double y, double z, bool is_acceleration);
 
   std::string map_name() const;
   int64_t num_landmarks() const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <Eigen/Dense>
@@ -95,7 +96,9 @@ class ThreeDepths {
   ThreeDepths(const std::array<RigRay, 3>& rays, const std::array<Eigen::Vector3d, 3>& points)
       : xy_(rays[0], rays[1], (points[0] - points[1]).squaredNorm()),
         xz_(rays[0], rays[2], (points[0] - points[2]).squaredNorm()),
-        yz_(rays[1], rays[2], (points[1] - points[2]).squaredNorm()) {}
+        yz_(rays[1], rays[2], (points[1] - points[2]).squaredNorm()),
+        least_squared_(std::min({(points[0] - points[1]).squaredNorm(), (points[0] - points[2]).squaredNorm(),
+                                 (points[1] - points[2]).squaredNorm()})) {}
 
   std::vector<Eigen::Vector3d> Solve() const {
     // With x fixed: y^2 + b1 y + c1 = 0, z^2 + b2 z + c2 = 0.
@@ -120,39 +123,69 @@ class ThreeDepths {
     if (degree == 0) return {};
     // [Cauchy] no root is larger.
     const double bound = 1 + largest / std::abs(resultant[degree]);
-    const Roots roots = RootsBetween(resultant, degree, 0, bound);
+    Polynomial derivative = Polynomial::Zero();
+    for (int i = 1; i <= degree; ++i) derivative[i - 1] = i * resultant[i];
     std::vector<Eigen::Vector3d> depths;
-    for (int i = 0; i < roots.num; ++i) {
-      const double x = roots.x[i];
-      const double z = -ValueAt(F, kMaxDegree, x) / ValueAt(E, kMaxDegree, x);
-      const double y = -(ValueAt(C, 1, x) * z + ValueAt(D, 2, x)) / (A * z + ValueAt(B, 1, x));
-      if (const auto polished = Polished({x, y, z})) depths.push_back(*polished);
+    // And where it turns: of two roots that are nearly one, rounding leaves no change of sign.
+    for (const Roots& starts :
+         {RootsBetween(resultant, degree, 0, bound), RootsBetween(derivative, degree - 1, 0, bound)}) {
+      for (int i = 0; i < starts.num; ++i) {
+        const std::optional<Eigen::Vector3d> found = Polished(DepthsAt(starts.x[i]));
+        constexpr double kSame = 1e-7;
+        const bool is_new = found && std::none_of(depths.begin(), depths.end(), [&](const auto& known) {
+                              return (known - *found).norm() <= kSame * found->norm();
+                            });
+        if (is_new) depths.push_back(*found);
+      }
     }
     return depths;
   }
 
  private:
+  // With this first depth, of the two others that the first two distances allow, those which the third fits
+  // best.
+  Eigen::Vector3d DepthsAt(double x) const {
+    const auto seconds = [&](const DistanceEquation& equation) {
+      const double half_linear = 0.5 * (equation.xy * x + equation.y1);
+      const double constant = x * x + equation.x1 * x + equation.constant;
+      const double root = std::sqrt(std::max(0.0, half_linear * half_linear - constant));
+      return std::array<double, 2>{-half_linear - root, -half_linear + root};
+    };
+    Eigen::Vector3d best(x, 0, 0);
+    double least = std::numeric_limits<double>::infinity();
+    for (const double y : seconds(xy_)) {
+      for (const double z : seconds(xz_)) {
+        const double error = std::abs(yz_.At(y, z));
+        if (!(error < least)) continue;
+        least = error;
+        best = {x, y, z};
+      }
+    }
+    return best;
+  }
+
   // By Newton's steps on the three distances; nothing where they lead nowhere, or behind an origin.
   std::optional<Eigen::Vector3d> Polished(Eigen::Vector3d depths) const {
-    constexpr int kNumSteps = 5;
+    constexpr double kLargestError = 1e-6;  // of the least of the squared distances
+    constexpr int kNumSteps = 12;
     Eigen::Vector3d errors;
     for (int step = 0;; ++step) {
       const double x = depths.x(), y = depths.y(), z = depths.z();
       errors << xy_.At(x, y), xz_.At(x, z), yz_.At(y, z);
-      if (step == kNumSteps) break;
+      if (step == kNumSteps || errors.cwiseAbs().maxCoeff() <= kLargestError * 1e-6 * least_squared_) break;
       Eigen::Matrix3d jacobian;
       jacobian << xy_.DerivativeX(x, y), xy_.DerivativeY(x, y), 0,  //
           xz_.DerivativeX(x, z), 0, xz_.DerivativeY(x, z),          //
           0, yz_.DerivativeX(y, z), yz_.DerivativeY(y, z);
       depths -= jacobian.partialPivLu().solve(errors);
     }
-    constexpr double kLargestError = 1e-6;
-    const bool is_solved = errors.cwiseAbs().maxCoeff() <= kLargestError * (1 + depths.squaredNorm());
+    const bool is_solved = errors.cwiseAbs().maxCoeff() <= kLargestError * least_squared_;
     if (!is_solved || !(depths.minCoeff() > 0)) return std::nullopt;  // NaN: neither
     return depths;
   }
 
   DistanceEquation xy_, xz_, yz_;
+  double least_squared_;
 };
 
 // Axes of the triangle of three points: columns.
@@ -172,8 +205,13 @@ Eigen::Matrix3d LevelFrom(const Eigen::Vector3d& up) {
 
 std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
                                      const std::array<Eigen::Vector3d, 3>& points) {
-  // In units of the triangle, so that coefficients are near 1.
-  const double unit = std::max((points[1] - points[0]).norm(), (points[2] - points[0]).norm());
+  // In units of how far away the points are, more or less: powers of depths lose no digits then.
+  double unit = 0;
+  for (int i = 0; i < 3; ++i) {
+    constexpr double kLeastChord = 1e-3;  // of directions
+    const double chord = (rays[i].direction - rays[(i + 1) % 3].direction).norm();
+    unit += (points[i] - points[(i + 1) % 3]).norm() / std::max(kLeastChord, chord) / 3;
+  }
   if (!(unit > 0) || !std::isfinite(unit)) return {};
   std::array<RigRay, 3> scaled_rays = rays;
   std::array<Eigen::Vector3d, 3> scaled_points;

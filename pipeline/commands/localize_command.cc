@@ -34,13 +34,14 @@ namespace {
 // An image, or with --rig the reference camera's, and which way was up at it.
 struct Asked {
   std::string image;
-  std::optional<SensedUp> up;
+  Result<std::optional<SensedUp>> up = std::optional<SensedUp>();
 };
 
 // An image's answer.
 struct Answer {
   std::string image;
   CameraId camera_id = 0;
+  Pose cam_from_rig;  // of the image's camera, where the fix is a rig's
   Result<Localization> localization = Error{};
   std::optional<Result<TrackedVisualPose>> visual;
   std::optional<Disagreement> disagreement;  // where both have a fix
@@ -88,7 +89,8 @@ struct Trackers {
   }
 
   // Which way is up there.
-  Status SenseUp(const std::optional<SensedUp>& up, QueryFrame* frame) {
+  Status SenseUp(const Result<std::optional<SensedUp>>& told, QueryFrame* frame) {
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, told);
     if (!up) return Ok();
     frame->set_up(*up);
     return in_space ? in_space->SenseUp(up->direction, up->sigma_deg) : Ok();
@@ -146,7 +148,9 @@ Answer LocalizeRigImages(const Asked& asked, const std::vector<RigCamera>& rig,
   answer.localization = [&]() -> Result<Localization> {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<RigImage> images, ReadRigImages(asked.image, rig, cameras));
     answer.camera_id = images.front().camera.camera_id;
-    return Localizer(map, arguments.options).LocalizeRig(images, std::nullopt, asked.up);
+    answer.cam_from_rig = rig.front().cam_from_rig;
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
+    return Localizer(map, arguments.options).LocalizeRig(images, std::nullopt, up);
   }();
   return answer;
 }
@@ -159,9 +163,10 @@ Answer LocalizeImage(const Asked& asked, const std::shared_ptr<const Map>& map, 
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     Localizer localizer(map, arguments.options);
-    if (arguments.log_folder.empty()) return localizer.Localize(grey, camera, std::nullopt, asked.up);
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
+    if (arguments.log_folder.empty()) return localizer.Localize(grey, camera, std::nullopt, up);
     answer.frame.emplace(localizer, grey, camera);
-    if (asked.up) answer.frame->set_up(*asked.up);
+    if (up) answer.frame->set_up(*up);
     CAIRN_ASSIGN_OR_RETURN(const Query* query, answer.frame->WithAllFeatures());
     return localizer.LocalizeQuery(*query, std::nullopt);
   }();
@@ -284,10 +289,10 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
     std::vector<Asked> asked;
     for (const std::string& image : batch) {
-      asked.push_back({image, std::nullopt});
-      if (gravity) {
-        CAIRN_ASSIGN_OR_RETURN(asked.back().up, gravity->Next(image));
-      }
+      asked.push_back({image});
+      if (!gravity) continue;
+      const Result<SensedUp> up = gravity->Next(image);
+      asked.back().up = up.ok() ? Result<std::optional<SensedUp>>(std::optional(*up)) : up.error();
     }
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
@@ -314,7 +319,7 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
         }
         poses.push_back({.name = name,
                          .camera_id = answer.camera_id,
-                         .cam_from_world = answer.localization->cam_from_world});
+                         .cam_from_world = answer.cam_from_rig * answer.localization->cam_from_world});
       }
     }
     if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "localizing was stopped");
@@ -363,8 +368,9 @@ Command LocalizeCommand() {
             parser
                 .Add("--gravity", arguments->gravity_path,
                      "A line for each image, which way was up: a direction in the camera's frame (with --rig "
-                     "the rig's), to the right, down and ahead, of any length; poses then come from two "
-                     "landmarks, not three, and none tilts the camera")
+                     "the rig's), to the right, down and ahead, of any length; no pose tilts the camera "
+                     "then, and "
+                     "where up is known well, two landmarks make one, not three")
                 .Type("FILE");
             parser
                 .Add("--gravity-sigma-deg", arguments->gravity_sigma_deg,

@@ -62,7 +62,14 @@ Result<std::vector<RigImage>> ReadRigImages(const std::string& image, const std:
       of_camera.camera.width = of_camera.grey.cols;
       of_camera.camera.height = of_camera.grey.rows;
     } else {
-      CAIRN_ASSIGN_OR_RETURN(of_camera.camera, cameras.ForImage(of_camera.grey.cols, of_camera.grey.rows));
+      const Result<Camera> of_size = cameras.ForImage(of_camera.grey.cols, of_camera.grey.rows);
+      if (!of_size.ok()) {
+        return MakeError(
+            of_size.error().code,
+            "{}: {}: or put 'camera_model_name' and 'camera_params' of {} into the file of --rig", name,
+            of_size.error().message, rig[i].image_prefix);
+      }
+      of_camera.camera = *of_size;
     }
     images.push_back(std::move(of_camera));
   }

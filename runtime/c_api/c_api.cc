@@ -175,13 +175,12 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
     CAIRN_RETURN_IF_ERROR(CheckFix(fix));
     Return(FixFrom({}), fix);  // after an error the caller must not find the previous fix
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    const auto up = std::exchange(used->up, std::nullopt);  // of this image, whatever comes
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
     CAIRN_ASSIGN_OR_RETURN(Query query, used->localizer->QueryFromImage(grey, chosen));
-    if (used->up) {
-      CAIRN_RETURN_IF_ERROR(used->localizer->SetUp(*std::exchange(used->up, std::nullopt), &query));
-    }
+    if (up) CAIRN_RETURN_IF_ERROR(used->localizer->SetUp(*up, &query));
     CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(query, believed));
     Return(FixFrom(found), fix);
     if (used->log) used->log->Offer(query, found);
@@ -206,11 +205,10 @@ int32_t cairn_localize_rig(cairn_localizer* localizer, const cairn_rig_image* co
     CAIRN_RETURN_IF_ERROR(CheckFix(fix));
     Return(FixFrom({}), fix);
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    const auto up = std::exchange(used->up, std::nullopt);  // of this image, whatever comes
     CAIRN_ASSIGN_OR_RETURN(const std::vector<RigImage> rig, RigImagesOf(images, num_images, *used->map));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
-    CAIRN_ASSIGN_OR_RETURN(
-        const Localization found,
-        used->localizer->LocalizeRig(rig, believed, std::exchange(used->up, std::nullopt)));
+    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeRig(rig, believed, up));
     Return(FixFrom(found), fix);
     return Ok();
   });
@@ -222,6 +220,7 @@ int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* i
     CAIRN_RETURN_IF_ERROR(CheckFix(fix));
     Return(cairn_floor_fix CAIRN_FLOOR_FIX_INIT, fix);
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    used->up.reset();  // it was of this image
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     if (!used->visual) {

@@ -17,8 +17,6 @@ namespace {
 
 constexpr int kMaxSampleSize = 3;
 constexpr int kMinNumInliers = 4;
-// A pose that has up farther than so many standard deviations from where it was sensed is none.
-constexpr double kMaxUpSigmas = 4;
 
 // The cameras of a rig at one of its poses.
 class CamerasAt {
@@ -145,7 +143,7 @@ std::vector<Pose> Solve(const std::vector<PoseMeasurement>& measurements, const 
                         int sample_size, const std::optional<UpMeasurement>& up) {
   if (sample_size == 2) return SolveTwoPoints(measurements, sample, *up);
   std::vector<Pose> poses = SolveThreePoints(measurements, sample);
-  if (up) std::erase_if(poses, [&](const Pose& pose) { return UpErrorInSigmas(*up, pose) > kMaxUpSigmas; });
+  if (up) std::erase_if(poses, [&](const Pose& pose) { return UpErrorInSigmas(*up, pose) > up->max_sigmas; });
   return poses;
 }
 
@@ -254,11 +252,7 @@ double UpErrorPx(const std::vector<PoseMeasurement>& measurements, const UpMeasu
 
 bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options) {
-  if (!up || measurements.empty()) return false;
-  // An error of up moves points in the image: of those that are inliers all the same, local refinement finds
-  // the others.
-  constexpr double kMaxErrors = 3;
-  return UpErrorPx(measurements, *up) <= kMaxErrors * options.max_error_px;
+  return up && !measurements.empty() && UpErrorPx(measurements, *up) <= options.max_error_px;
 }
 
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
@@ -266,10 +260,14 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
                                         uint64_t seed, const std::optional<UpMeasurement>& up) {
   const int num_measurements = static_cast<int>(measurements.size());
   if (num_measurements < kMinNumInliers) return {};
-  const int sample_size = UsesTwoPoints(measurements, up, options) ? 2 : 3;
-  // Where its error is larger than an inlier's, two points may lead to a wrong pose: every other sample is of
-  // three.
-  const bool alternates = sample_size == 2 && UpErrorPx(measurements, *up) > options.max_error_px;
+  // An error of up moves points in the image.  Of those that are inliers all the same, local refinement finds
+  // the others; but where it is larger than an inlier's, two points may lead to a wrong pose: every other
+  // sample is of three, and where it is much larger, all are.
+  constexpr double kMaxErrors = 3;
+  const bool is_exact = UsesTwoPoints(measurements, up, options);
+  const bool alternates =
+      up && !is_exact && UpErrorPx(measurements, *up) <= kMaxErrors * options.max_error_px;
+  const int sample_size = is_exact || alternates ? 2 : 3;
   const double limit = options.max_error_px * options.max_error_px;
   std::vector<ScoredPose> best;  // by score
   Random random(seed);
@@ -297,6 +295,7 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
       Insert({{local, std::move(inliers)}, score}, max_num_poses, &best);
       num_iterations =
           NumIterations(best.front().estimate.inliers.size(), measurements.size(), sample_size, options);
+      if (alternates) num_iterations = std::min(2 * num_iterations, options.max_num_ransac_iterations);
     }
   }
   std::vector<PoseEstimate> poses;

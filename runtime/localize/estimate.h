@@ -18,8 +18,8 @@ struct PoseEstimate {
   int num_iterations = 0;
 };
 
-// Whether poses come from two points and up, where up is known; else from three, of which those that tilt the
-// camera are left out.
+// Whether poses come from two points and up alone, as up is known better than an inlier; else from three as
+// well, of which those that tilt the camera are left out.
 bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options);
 

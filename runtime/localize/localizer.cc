@@ -163,7 +163,8 @@ Status Localizer::SetUp(const SensedUp& up, Query* query) const {
   const MapHead& head = map_->head();
   query->up = UpMeasurement{head.camera_from_given.rotation * up.direction.normalized(),
                             head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ(),
-                            RadFromDeg(std::hypot(up.sigma_deg, options_.floor_up_sigma_deg))};
+                            RadFromDeg(std::hypot(up.sigma_deg, options_.floor_up_sigma_deg)),
+                            options_.accept.max_up_sigmas};
   return Ok();
 }
 
@@ -293,8 +294,10 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   }
   const std::vector<PoseMeasurement> measurements = MakeMeasurements(sighting, *landmarks, matches);
   const std::optional<UpMeasurement>& up = sighting.up;
+  const char* with_gravity = up ? " with the sensed up" : "";
   const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed, up);
-  if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
+  if (!estimate)
+    return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose{}", matches.size(), with_gravity));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
   const double chance_of_inlier =
       ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, sighting);
@@ -304,9 +307,9 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
       log10_chance > accept.max_log10_chance) {
     return fail(NoFix::kTooFewInliers,
-                fmt::format("{} of {} matches agree on a pose, as they would by chance on 10^{:.1f} poses; "
+                fmt::format("{} of {} matches agree on a pose{}, as they would by chance on 10^{:.1f} poses; "
                             "at least {} matches and at most 10^{:g} poses are needed",
-                            estimate->inliers.size(), matches.size(), log10_chance,
+                            estimate->inliers.size(), matches.size(), with_gravity, log10_chance,
                             accept.min_num_unguided_inliers, accept.max_log10_chance));
   }
   std::vector<PoseEstimate> firsts;
@@ -455,6 +458,13 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
       !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
     return std::nullopt;
   return second;
+}
+
+void QueryFrame::set_up(const SensedUp& up) {
+  up_ = up;
+  if (!query_) return;
+  Query with_up = *query_;
+  if (localizer_.SetUp(up, &with_up).ok()) query_ = std::make_shared<const Query>(std::move(with_up));
 }
 
 Result<const Query*> QueryFrame::WithAllFeatures() {

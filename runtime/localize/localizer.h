@@ -48,7 +48,8 @@ class Localizer {
   // From 8-bit grey pixels of the camera's size.  Same image, same result.  Errors: InvalidArgument (not
   // 8-bit grey; a camera that is invalid or of another size); Corrupt, Io (a part of the map that is needed
   // is damaged or cannot be read).  An image that cannot be localized is no error: see Localization::reason.
-  // `up`: a pose from two landmarks, not three, and none that tilts the camera; errors: as CheckSensedUp.
+  // `up`: no pose that tilts the camera, and, where it is known well, poses from two landmarks, not three;
+  // errors: as CheckSensedUp.
   // No exception leaves it.
   Result<Localization> Localize(const cv::Mat& grey, const Camera& camera,
                                 const std::optional<PosePrior>& prior = std::nullopt,
@@ -165,8 +166,8 @@ class QueryFrame {
   QueryFrame(const Localizer& localizer, Features features, const Camera& camera)
       : localizer_(localizer), features_(std::move(features)), camera_(camera) {}
 
-  // Which way was up.  REQUIRES: CheckSensedUp
-  void set_up(const SensedUp& up) { up_ = up; }
+  // Which way was up, of features that are known by now, too.  REQUIRES: CheckSensedUp
+  void set_up(const SensedUp& up);
   const std::optional<SensedUp>& up() const { return up_; }
   // Query::readout where the frame has a pose, by what is believed or known by now.
   using ReadoutAt = std::function<ReadoutMotion(const Pose& cam_from_world)>;

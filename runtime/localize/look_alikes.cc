@@ -48,6 +48,13 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
   };
   for (const Pose& pose : poses) CAIRN_RETURN_IF_ERROR(add(pose));
   CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
+  // What each camera of a rig makes of it differs by how far survey images are from each other; the landmarks
+  // of a place are those from all around it.
+  const auto are_one_place = [&](const Pose& a, const Pose& b) {
+    if (sighting.num_images() == 1) return !AreFarApart(a, b, options_.accept);
+    return CenterErrorM(a, b) <= options_.retrieve.prior_distance_m &&
+           RotationErrorDeg(a, b) <= options_.retrieve.prior_angle_deg;
+  };
   std::vector<LookAlikePose> found;
   std::vector<double> weights(poses.size(), 0);  // of all cameras, at each
   for (int k = 0; k < sighting.num_images(); ++k) {
@@ -65,10 +72,10 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
       if (places[i].near[k].empty()) continue;
       const int32_t image = places[i].near[k][0].image;
       CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(image));
-      const auto weight = static_cast<double>(nearest->landmarks.size());
-      weights[i] += weight;
       const NodeIdx node = appearance->node_of_image[image];
       if (node < 0) continue;
+      const auto weight = static_cast<double>(nearest->landmarks.size());
+      weights[i] += weight;
       const Pose rig_from_nearest = poses[i] * nearest->cam_from_world.Inverse();
       for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
         const int32_t other = appearance->node_images[look_alike.node].front();
@@ -77,7 +84,7 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
         const Pose there = rig_from_nearest * other_image->cam_from_world;
         // Of a place many images look alike.
         const auto known = std::find_if(found.begin(), found.end(), [&](const LookAlikePose& place) {
-          return place.of_pose == i && !AreFarApart(place.rig_from_world, there, options_.accept);
+          return place.of_pose == i && are_one_place(place.rig_from_world, there);
         });
         if (known == found.end()) {
           found.push_back({there, i, k, weight});

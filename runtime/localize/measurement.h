@@ -45,6 +45,7 @@ struct UpMeasurement {
   Eigen::Vector3d in_rig = -Eigen::Vector3d::UnitY();  // of length 1, as the other
   Eigen::Vector3d in_world = Eigen::Vector3d::UnitZ();
   double sigma_rad = 0;
+  double max_sigmas = 4;  // poses that have up farther off than so many of these are none
 };
 
 // What localization needs of a query image.

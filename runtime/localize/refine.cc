@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -216,6 +217,15 @@ double TruncationFactor(double limit) {
   return (1 - tail) / (1 - (1 + 0.5 * limit) * tail);
 }
 
+// With how many others of its image a measurement's keypoint errs together, on the mean.  REQUIRES: any
+double MeanNumInImage(const std::vector<PoseMeasurement>& measurements) {
+  std::map<int, double> num_in_image;
+  for (const PoseMeasurement& measurement : measurements) ++num_in_image[measurement.image];
+  double sum = 0;
+  for (const auto& [image, num] : num_in_image) sum += num * num;
+  return sum / static_cast<double>(measurements.size());
+}
+
 Matrix6d Adjoint(const Pose& b_from_a) {
   const Eigen::Matrix3d rotation = b_from_a.rotation.toRotationMatrix();
   Matrix6d adjoint = Matrix6d::Zero();
@@ -302,15 +312,15 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   RefinedPose refined;
   const double truncation = TruncationFactor(options.inlier_chi_square);
   // By how much keypoints' errors are larger than stated, those that they share among them.
-  const auto variance_unit = [&](size_t num_inliers) {
-    const double dispersion = 1 + 0.5 * static_cast<double>(num_inliers) * options.keypoint_correlation;
+  const auto variance_unit = [&](const std::vector<PoseMeasurement>& used) {
+    const double dispersion = 1 + 0.5 * MeanNumInImage(used) * options.keypoint_correlation;
     return options.covariance_scale * dispersion * truncation * refined.noise_variance;
   };
   std::vector<double> squares = WhitenedSquares(measurements, *pose);
   // The loss's scale is in units of the noise, which is known only now.
   refined.noise_variance = VarianceFromMedian(squares);
   pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
-                            options.max_num_refine_iterations, {up, variance_unit(measurements.size())});
+                            options.max_num_refine_iterations, {up, variance_unit(measurements)});
   if (!pose) return std::nullopt;
   squares = WhitenedSquares(measurements, *pose);
   refined.noise_variance = VarianceFromMedian(squares);
@@ -323,9 +333,9 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     if (inliers.size() < kMinNumInliers) return std::nullopt;
     if (round > 0 && inliers == refined.inliers) break;
     refined.inliers = std::move(inliers);
-    pose = LevenbergMarquardt(Select(measurements, refined.inliers), *pose,
-                              std::numeric_limits<double>::infinity(), options.max_num_refine_iterations,
-                              {up, variance_unit(refined.inliers.size())});
+    const std::vector<PoseMeasurement> used = Select(measurements, refined.inliers);
+    pose = LevenbergMarquardt(used, *pose, std::numeric_limits<double>::infinity(),
+                              options.max_num_refine_iterations, {up, variance_unit(used)});
     if (!pose) return std::nullopt;
     squares = WhitenedSquares(measurements, *pose);
     double sum = 0;
@@ -334,9 +344,10 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
         std::max(1e-6, truncation * VarianceFromSum(sum, static_cast<int>(refined.inliers.size())));
     if (!std::isfinite(refined.noise_variance)) return std::nullopt;
   }
-  const double unit = variance_unit(refined.inliers.size());
-  const NormalEquations equations = BuildNormalEquations(Select(measurements, refined.inliers), *pose,
-                                                         std::numeric_limits<double>::infinity(), {up, unit});
+  const std::vector<PoseMeasurement> used = Select(measurements, refined.inliers);
+  const double unit = variance_unit(used);
+  const NormalEquations equations =
+      BuildNormalEquations(used, *pose, std::numeric_limits<double>::infinity(), {up, unit});
   const Eigen::LDLT<Matrix6d> factors(equations.matrix);
   if (factors.info() != Eigen::Success || !factors.isPositive() || factors.vectorD().minCoeff() <= 0)
     return std::nullopt;

@@ -306,7 +306,9 @@ ReadoutMotion RegionTracker::ReadoutOf(const Pose& given_cam_from_world) const {
   if (!at_last_frame_) return UnknownReadout();
   const Pose cam_from_world = map_->head().camera_from_given * given_cam_from_world;
   const Vector6d step = PerturbationBetween(*at_last_frame_, cam_from_world);
-  if (!knows_step_) return {options_.readout_ratio * step, options_.readout_ratio * step.cwiseAbs()};
+  if (!knows_step_)
+    return {options_.readout_ratio * step,
+            (options_.readout_ratio * step).cwiseAbs().cwiseMax(UnknownReadout().sigmas)};
   // That is how fast it was half a frame ago, by as much faster than a frame before as it may be now.
   const Vector6d faster = 0.5 * (step - PerturbationBetween(Pose(), step_));
   return {options_.readout_ratio * (step + faster), options_.readout_ratio * faster.cwiseAbs()};

@@ -98,6 +98,7 @@ TEST_F(CApi, RigsAndGravityAreThoseOfTheCxxApi) {
     }
   };
   for (const bool with_up : {false, true}) {
+    SCOPED_TRACE(with_up);
     if (with_up) {
       ASSERT_EQ(cairn_localizer_sense_up(localizer, 0.01, -2, 0.02, 1.5), CAIRN_OK) << cairn_last_error();
     }
@@ -116,6 +117,13 @@ TEST_F(CApi, RigsAndGravityAreThoseOfTheCxxApi) {
   ASSERT_EQ(cairn_localizer_sense_up(localizer, 1, -1, 0, 1), CAIRN_OK);
   ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
   EXPECT_EQ(fix.has_fix, 0);
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
+  EXPECT_EQ(fix.has_fix, 1);
+  // Of an image that cannot be tried, too.
+  ASSERT_EQ(cairn_localizer_sense_up(localizer, 1, -1, 0, 1), CAIRN_OK);
+  cairn_image narrow = image;
+  narrow.width = 300;
+  EXPECT_NE(cairn_localize(localizer, &narrow, nullptr, nullptr, &fix), CAIRN_OK);
   ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
   EXPECT_EQ(fix.has_fix, 1);
   EXPECT_STREQ(cairn_reason_name(CAIRN_TILTED), "tilted");

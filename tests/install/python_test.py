@@ -507,6 +507,14 @@ class Localizing(Poster):
                 run = subprocess.run([*localize, *options], capture_output=True, text=True)
                 self.assertNotEqual(run.returncode, 0, options)
                 self.assertIn(words, run.stderr + run.stdout)
+            # A line that is no direction is its image's error alone.
+            (folder / "up.txt").write_text("0 0 0\n0 -1 0\n")
+            run = subprocess.run([*localize, folder / "left" / "a.pgm", folder / "left" / "a.pgm", "--gravity", folder / "up.txt"],
+                                 capture_output=True, text=True)
+            self.assertNotEqual(run.returncode, 0)
+            bad, good = [json.loads(line) for line in run.stdout.splitlines()]
+            self.assertIn("no direction", json.dumps(bad))
+            self.assertTrue(good["fix"])
             (folder / "right" / "a.pgm").unlink()
             run = subprocess.run([*localize, folder / "left" / "a.pgm"], capture_output=True, text=True)
             self.assertNotEqual(run.returncode, 0)

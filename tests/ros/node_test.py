@@ -459,9 +459,9 @@ class Node(unittest.TestCase):
             self.assertNotEqual(robot.show(picture, 0.5)["reason"], "none")
             sense(0, (0, 0, 9.8))
             self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
-            sense(0, (0, -6, 7.8))
+            sense(0, (0, -7.5, 6.3))
             self.assertNotEqual(robot.show(picture, 0.5)["reason"], "none")
-            sense(0, (3, -6, 7.8))  # longer than gravity: nothing is known of up
+            sense(0, (3, -7.5, 6.3))  # longer than gravity: nothing is known of up
             self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
 
     def test_bad_parameters_end_the_node_with_a_sentence(self):

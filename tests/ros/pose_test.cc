@@ -198,6 +198,8 @@ TEST(Gravity, IsWhatWasSaidNearestToTheImageInItsCamerasFrame) {
     EXPECT_LT((gravity.At(image_time_s)->direction - second).norm(), 1e-9) << image_time_s;
   EXPECT_LT((gravity.At(9.91)->direction - Eigen::Vector3d(0, -9.81, 0)).norm(), 1e-9);
   for (const double too_far : {9.89, 10.17}) EXPECT_FALSE(gravity.At(too_far)) << too_far;
+  ASSERT_TRUE(gravity.Add(11, {1, 0, 0}, 2).ok());
+  EXPECT_DOUBLE_EQ(gravity.At(11)->sigma_deg, 2.5);
   // A recording begins again.
   ASSERT_TRUE(gravity.Add(2, {9.81, 0, 0}).ok());
   EXPECT_FALSE(gravity.At(10.02));

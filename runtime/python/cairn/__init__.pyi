@@ -510,8 +510,8 @@ class Localizer:
     ) -> Fix:
         """From grey pixels, (height, width); rows may have gaps; other memory layouts raise a ValueError.
 
-        `camera` None: the survey's camera of the image's size.  `up`: poses come from two landmarks, not three, and none tilts the
-        camera.  Releases the interpreter's lock meanwhile.
+        `camera` None: the survey's camera of the image's size.  `up`: no pose tilts the camera, and where it is known well, two
+        landmarks make one, not three.  Releases the interpreter's lock meanwhile.
         """
     def localize_rig(self, images: Sequence[RigImage], prior: Prior | None = None, up: Up | None = None) -> Fix:
         """One fix of what the cameras of a rig see at the same time: fix, prior and up are the rig's.  Nothing of it is logged."""

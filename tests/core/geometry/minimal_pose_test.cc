@@ -71,6 +71,31 @@ TEST(PosesFromThreeRays, TheTruePoseIsAmongThemAndAllPutThePointsOnTheRays) {
   }
 }
 
+// As landmarks of a far wall are: seen in a small part of the image.
+TEST(PosesFromThreeRays, SmallTrianglesFarAwayHaveThemToo) {
+  Random random(5);
+  for (const double depth_m : {4.0, 10.0, 30.0}) {
+    int num_found = 0;
+    constexpr int kNumTrials = 1000;
+    for (int trial = 0; trial < kNumTrials; ++trial) {
+      const Pose truth = RandomPose(random);
+      std::array<RigRay, 3> rays;
+      std::array<Eigen::Vector3d, 3> points;
+      const Eigen::Vector3d middle = depth_m * RandomVector(random, 1).normalized();
+      for (int i = 0; i < 3; ++i) {
+        const Eigen::Vector3d seen = middle + RandomVector(random, 0.5);
+        rays[i].origin = {i == 0 ? 0.0 : 0.12, 0, 0};  // a stereo pair
+        rays[i].direction = (seen - rays[i].origin).normalized();
+        points[i] = truth.Inverse() * seen;
+      }
+      const std::vector<Pose> poses = PosesFromThreeRays(rays, points);
+      for (const Pose& pose : poses) EXPECT_LT(WorstMiss(pose, rays, points), 1e-4);
+      num_found += Nearest(poses, truth) < 1e-3 * depth_m ? 1 : 0;
+    }
+    EXPECT_GE(num_found, 0.97 * kNumTrials) << depth_m;
+  }
+}
+
 TEST(PosesFromThreeRays, OfOneCameraTheyAreThoseOfTheThreePointProblem) {
   Random random(2);
   int num_of_opencv = 0, num_same = 0;

@@ -192,6 +192,33 @@ TEST(Gravity, AFixThatTiltsTheCameraSaysSo) {
                   ->has_fix());
 }
 
+TEST(Gravity, WhereTheFloorLeansMoreSigmasMayBeAllowed) {
+  LocalizerOptions options;
+  const Pose truth = PoseAt({0.4, 0.3, 1.2}, 20);
+  const Features features = RenderFeatures(Room(), truth, {}, 3);
+  const SensedUp far_off{Tilted(truth, 14, 0).rotation * Eigen::Vector3d::UnitZ(), 1};
+  options.accept.min_probability = 0;
+  const Localization none =
+      *Localizer(RoomMap(), options).LocalizeFeatures(features, Room().camera, std::nullopt, far_off);
+  EXPECT_FALSE(none.has_fix());
+  EXPECT_THAT(none.message, testing::HasSubstr("sensed"));
+  options.accept.max_up_sigmas = 10;
+  const Localization found =
+      *Localizer(RoomMap(), options).LocalizeFeatures(features, Room().camera, std::nullopt, far_off);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.1);
+}
+
+TEST(Gravity, IsOfAFramesFeaturesThatAreKnownByThen) {
+  const Localizer localizer(RoomMap());
+  const Pose truth = PoseAt({0.4, 0.3, 1.2}, 20);
+  QueryFrame frame(localizer, RenderFeatures(Room(), truth, {}, 3), Room().camera);
+  EXPECT_FALSE((*frame.WithAllFeatures())->up);
+  frame.set_up({UpAt(truth), 1});
+  ASSERT_TRUE((*frame.WithAllFeatures())->up);
+  EXPECT_LT(((*frame.WithAllFeatures())->up->in_rig - UpAt(truth)).norm(), 1e-9);
+}
+
 TEST(Gravity, IsOfTheGivenCamerasFrame) {
   MapRows rows = Room().rows;
   rows.camera_from_given.rotation =

@@ -82,6 +82,19 @@ TEST(Refine, WhatIsNotKnownOfTheMotionWhileRowsAreReadIsInTheCovariance) {
   EXPECT_GT(sum / kNumTrials, 3);  // the noise that is found has a part of the motion, too
 }
 
+TEST(Refine, KeypointsErrTogetherWithThoseOfTheirImageAlone) {
+  Random random(4);
+  auto measurements = MakeScene(Truth(), 80, 0.5, 0, random);
+  RefineOptions options = kIndependent;
+  options.inlier_chi_square = 100;
+  options.keypoint_correlation = 0.1;
+  const auto of_one = RefinePoseWithCovariance(measurements, Disturbed(), options);
+  for (size_t i = 0; i < measurements.size(); ++i) measurements[i].image = i < 40 ? 0 : 1;
+  const auto of_two = RefinePoseWithCovariance(measurements, Disturbed(), options);
+  ASSERT_TRUE(of_one && of_two);
+  EXPECT_NEAR(of_one->covariance.trace() / of_two->covariance.trace(), (1 + 4.0) / (1 + 2.0), 1e-9);
+}
+
 TEST(Refine, OfOneCameraOfARigThePoseIsTheRigs) {
   Random random(3);
   const Pose cam_from_rig = Perturb(Pose(), (Vector6d() << 0.5, -1, 0.3, 0.2, -0.4, 0.6).finished());
