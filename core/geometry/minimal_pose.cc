@@ -33,7 +33,7 @@ double ValueAt(const Polynomial& polynomial, int degree, double x) {
 }
 
 struct Roots {
-  std::array<double, kMaxDegree + 2> x;
+  std::array<double, 2 * kMaxDegree> x;
   int num = 0;
   void Add(double root) { x[num++] = root; }
 };
@@ -57,13 +57,15 @@ double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, i
 }
 
 // Where it changes its sign between two places, ascending: once at most between two of its derivative's
-// roots.
-Roots RootsBetween(const Polynomial& polynomial, int degree, double low, double high) {
+// roots, `turns`.
+Roots RootsBetween(const Polynomial& polynomial, int degree, double low, double high,
+                   Roots* turns = nullptr) {
   Roots roots;
   if (degree < 1) return roots;
   Polynomial derivative = Polynomial::Zero();
   for (int i = 1; i <= degree; ++i) derivative[i - 1] = i * polynomial[i];
   Roots ends = RootsBetween(derivative, degree - 1, low, high);
+  if (turns != nullptr) *turns = ends;
   ends.Add(high);
   for (int i = 0; i < ends.num; ++i) {
     const double from = i == 0 ? low : ends.x[i - 1];
@@ -123,20 +125,32 @@ class ThreeDepths {
     if (degree == 0) return {};
     // [Cauchy] no root is larger.
     const double bound = 1 + largest / std::abs(resultant[degree]);
-    Polynomial derivative = Polynomial::Zero();
-    for (int i = 1; i <= degree; ++i) derivative[i - 1] = i * resultant[i];
+    Roots turns;
+    Roots starts = RootsBetween(resultant, degree, 0, bound, &turns);
+    // And where it turns near zero: of two roots that are nearly one, rounding leaves no change of sign.
+    const Polynomial magnitudes = resultant.cwiseAbs();
+    for (int i = 0; i < turns.num; ++i) {
+      constexpr double kNearZero = 1e-5;  // of the sum of its terms
+      if (std::abs(ValueAt(resultant, degree, turns.x[i])) <=
+          kNearZero * ValueAt(magnitudes, degree, turns.x[i]))
+        starts.Add(turns.x[i]);
+    }
     std::vector<Eigen::Vector3d> depths;
-    // And where it turns: of two roots that are nearly one, rounding leaves no change of sign.
-    for (const Roots& starts :
-         {RootsBetween(resultant, degree, 0, bound), RootsBetween(derivative, degree - 1, 0, bound)}) {
-      for (int i = 0; i < starts.num; ++i) {
-        const std::optional<Eigen::Vector3d> found = Polished(DepthsAt(starts.x[i]));
-        constexpr double kSame = 1e-7;
-        const bool is_new = found && std::none_of(depths.begin(), depths.end(), [&](const auto& known) {
-                              return (known - *found).norm() <= kSame * found->norm();
-                            });
-        if (is_new) depths.push_back(*found);
-      }
+    const auto polish = [&](const Eigen::Vector3d& start) {
+      const std::optional<Eigen::Vector3d> found = Polished(start);
+      constexpr double kSame = 1e-7;
+      const bool is_new = found && std::none_of(depths.begin(), depths.end(), [&](const auto& known) {
+                            return (known - *found).norm() <= kSame * found->norm();
+                          });
+      if (is_new) depths.push_back(*found);
+      return is_new;
+    };
+    for (int i = 0; i < starts.num; ++i) {
+      const double x = starts.x[i];
+      if (polish(DepthsAt(x))) continue;
+      // By what eliminated them.
+      const double z = -ValueAt(F, kMaxDegree, x) / ValueAt(E, kMaxDegree, x);
+      polish({x, -(ValueAt(C, 1, x) * z + ValueAt(D, 2, x)) / (A * z + ValueAt(B, 1, x)), z});
     }
     return depths;
   }
@@ -166,13 +180,13 @@ class ThreeDepths {
 
   // By Newton's steps on the three distances; nothing where they lead nowhere, or behind an origin.
   std::optional<Eigen::Vector3d> Polished(Eigen::Vector3d depths) const {
-    constexpr double kLargestError = 1e-6;  // of the least of the squared distances
+    constexpr double kLargestError = 1e-8;  // of the least of the squared distances
     constexpr int kNumSteps = 12;
     Eigen::Vector3d errors;
     for (int step = 0;; ++step) {
       const double x = depths.x(), y = depths.y(), z = depths.z();
       errors << xy_.At(x, y), xz_.At(x, z), yz_.At(y, z);
-      if (step == kNumSteps || errors.cwiseAbs().maxCoeff() <= kLargestError * 1e-6 * least_squared_) break;
+      if (step == kNumSteps || errors.cwiseAbs().maxCoeff() <= 1e-4 * kLargestError * least_squared_) break;
       Eigen::Matrix3d jacobian;
       jacobian << xy_.DerivativeX(x, y), xy_.DerivativeY(x, y), 0,  //
           xz_.DerivativeX(x, z), 0, xz_.DerivativeY(x, z),          //

@@ -361,8 +361,8 @@ CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* 
 /* Which way is up at the next image, or the next of a rig: a direction in the camera's frame (a rig's), of
  * any length, and its standard deviation per axis.  An accelerometer says so while the robot does not speed
  * up or brake, an IMU always.  No pose tilts the camera then
- * (CAIRN_TILTED), and where up is known well, two landmarks make one, not three; the map's floor says what is up
- * in the world. */
+ * (CAIRN_TILTED), and where up is known well, two landmarks make one, not three; the map's floor says what is
+ * up in the world. */
 CAIRN_API int32_t cairn_localizer_sense_up(cairn_localizer* localizer, double right, double down,
                                            double ahead, double sigma_deg);
 /* One fix of what the cameras of a rig see at the same time: fix and prior are poses of the rig
