@@ -37,14 +37,8 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"place_reach_links"}, "is for images without odometry; leave it out"));
   }
-  if (arguments.gravity_path.empty()) {
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"floor_up_sigma_deg", "max_up_sigmas", "place_map_up_sigma_deg"},
-        "is for gravity; give --gravity, or leave it out"));
-    if (arguments.gravity_sigma_deg > 0)
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
-  }
+  CAIRN_RETURN_IF_ERROR(arguments.gravity.Check(
+      arguments.option_arguments, {"floor_up_sigma_deg", "max_up_sigmas", "place_map_up_sigma_deg"}));
   if (arguments.sure_options.min_place_probability == 0 && arguments.period_s > 0)
     return MakeError(ErrorCode::kInvalidArgument,
                      "--period is for --min-place-probability; give it, 0.9 say, or leave this out");
@@ -98,7 +92,7 @@ Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
                         : arguments.estimator != "pnp"  ? "--estimator: visual maps are asked one by one"
                         : !arguments.log_folder.empty() ? "--log: frames are logged for one map"
                         : !arguments.rig_path.empty()   ? "--rig: a rig is localized in one map"
-                        : !arguments.gravity_path.empty()
+                        : !arguments.gravity.path.empty()
                             ? "--gravity: each map of an atlas has an up of its own"
                             : nullptr;
   if (refused == nullptr) return Ok();
@@ -112,7 +106,7 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
                      "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
                      "--estimator both");
   }
-  if (arguments.estimator == "visual-map" && !arguments.gravity_path.empty()) {
+  if (arguments.estimator == "visual-map" && !arguments.gravity.path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--gravity is for poses in space, and --estimator visual-map finds places on the floor; "
                      "use --estimator both");

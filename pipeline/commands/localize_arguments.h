@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/line/command.h"
+#include "pipeline/commands/odometry.h"
 #include "runtime/atlas/atlas_localizer.h"
 #include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/localizer_options.h"
@@ -26,8 +27,7 @@ struct LocalizeArguments {
   bool is_sequence = false;
   std::string odometry_path;
   double period_s = 0;  // 0: not given
-  std::string gravity_path;
-  double gravity_sigma_deg = 0;  // 0: not given
+  GravityArguments gravity;
   std::string rig_path;
   std::string estimator = "pnp";
   std::string log_folder;

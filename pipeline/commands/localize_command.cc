@@ -277,8 +277,8 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   CAIRN_ASSIGN_OR_RETURN(Trackers trackers, Trackers::Make(arguments, map));
   CAIRN_ASSIGN_OR_RETURN(std::optional<RobotLog> log, OpenLog(arguments, *map));
   std::optional<Gravity> gravity;
-  if (!arguments.gravity_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path, arguments.gravity_sigma_deg));
+  if (!arguments.gravity.path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity));
   }
   std::vector<RigCamera> rig;
   if (!arguments.rig_path.empty()) {
@@ -365,18 +365,12 @@ Command LocalizeCommand() {
                      "one before: metres ahead, metres to the left, degrees turned to the left; frames "
                      "without a fix then say where it is by that (believed)")
                 .Type("FILE");
-            parser
-                .Add("--gravity", arguments->gravity_path,
-                     "A line for each image, which way was up: a direction in the camera's frame (with --rig "
-                     "the rig's), to the right, down and ahead, of any length; no pose tilts the camera "
-                     "then, and "
-                     "where up is known well, two landmarks make one, not three")
-                .Type("FILE");
-            parser
-                .Add("--gravity-sigma-deg", arguments->gravity_sigma_deg,
-                     "Standard deviation of gravity's direction, degrees [2]")
-                .Range(1e-3, 90.0)
-                .Type("DEG");
+            arguments->gravity.Add(
+                parser,
+                "A line for each image, which way was up: a direction in the camera's frame (with --rig the "
+                "rig's), to the right, down and ahead, of any length; no pose tilts the camera then, and "
+                "where "
+                "up is known well, two landmarks make one, not three");
             parser
                 .Add("--rig", arguments->rig_path,
                      "COLMAP's rig_config.json: the images are of the rig's reference camera, those that its "

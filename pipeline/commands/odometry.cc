@@ -59,13 +59,28 @@ Status Odometry::MoveToNext(const std::string& image,
   return file_.is_first() ? Ok() : move({step[0], step[1]}, RadFromDeg(step[2]));
 }
 
-Result<Gravity> Gravity::Read(const std::string& path, double sigma_deg) {
+void GravityArguments::Add(ArgumentParser& parser, const std::string& help) {
+  parser.Add("--gravity", path, help).Type("FILE");
+  parser.Add("--gravity-sigma-deg", sigma_deg, "Standard deviation of gravity's direction, degrees [2]")
+      .Range(1e-3, 90.0)
+      .Type("DEG");
+}
+
+Status GravityArguments::Check(const OptionArguments& given, const std::vector<std::string>& options) const {
+  if (!path.empty()) return Ok();
+  CAIRN_RETURN_IF_ERROR(given.RefuseGiven(options, "is for gravity; give --gravity, or leave it out"));
+  if (sigma_deg == 0) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
+}
+
+Result<Gravity> Gravity::Read(const GravityArguments& arguments) {
   constexpr double kUsualSigmaDeg = 2;
   Gravity gravity;
-  gravity.sigma_deg_ = sigma_deg > 0 ? sigma_deg : kUsualSigmaDeg;
+  gravity.sigma_deg_ = arguments.sigma_deg > 0 ? arguments.sigma_deg : kUsualSigmaDeg;
   CAIRN_ASSIGN_OR_RETURN(
       gravity.file_,
-      SensorFile::Read(path,
+      SensorFile::Read(arguments.path,
                        "an image's gravity; expected the direction up in the camera's frame: to the right, "
                        "down and ahead"));
   return gravity;

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/base/error.h"
+#include "core/line/command.h"
 #include "runtime/localize/localization.h"
 
 namespace cairn::pipeline {
@@ -49,12 +50,22 @@ class Odometry {
   SensorFile file_;
 };
 
+// --gravity and --gravity-sigma-deg.
+struct GravityArguments {
+  std::string path;      // empty: not given
+  double sigma_deg = 0;  // 0: not given
+
+  void Add(ArgumentParser& parser, const std::string& help);
+  // Refuses an error of gravity without gravity, and these options.  Errors: InvalidArgument.
+  Status Check(const OptionArguments& given, const std::vector<std::string>& options) const;
+};
+
 // Which way was up at each image: a direction in the camera's frame (x right, y down, z ahead; of any
 // length).
 class Gravity {
  public:
-  // `sigma_deg`: of all of them; 0: what is usual, 2.  Errors: as SensorFile.
-  static Result<Gravity> Read(const std::string& path, double sigma_deg);
+  // With an error that is usual, 2 degrees, where none was given.  Errors: as SensorFile.
+  static Result<Gravity> Read(const GravityArguments& arguments);
   // Errors: as SensorFile, and as CheckSensedUp, naming the image.
   Result<SensedUp> Next(const std::string& image);
   Status CheckAllRead() const { return file_.CheckAllRead(); }

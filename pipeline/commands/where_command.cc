@@ -28,8 +28,7 @@ struct WhereArguments {
   std::string camera;
   std::string cameras_path;
   std::string odometry_path;
-  std::string gravity_path;
-  double gravity_sigma_deg = 0;  // 0: not given
+  GravityArguments gravity;
   double period_s = 1;
   int num_places = 3;
   bool json = false;
@@ -106,14 +105,8 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"reach_links"}, "is for images without odometry; leave it out"));
   }
-  if (arguments.gravity_path.empty()) {
-    CAIRN_RETURN_IF_ERROR(
-        arguments.option_arguments.RefuseGiven({"map_up_sigma_deg", "floor_up_sigma_deg", "max_up_sigmas"},
-                                               "is for gravity; give --gravity, or leave it out"));
-    if (arguments.gravity_sigma_deg > 0)
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "--gravity-sigma-deg is the error of --gravity; give that, or leave this out");
-  }
+  CAIRN_RETURN_IF_ERROR(arguments.gravity.Check(arguments.option_arguments,
+                                                {"map_up_sigma_deg", "floor_up_sigma_deg", "max_up_sigmas"}));
   cv::setNumThreads(1);
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras,
@@ -124,8 +117,8 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     CAIRN_ASSIGN_OR_RETURN(odometry, Odometry::Read(arguments.odometry_path));
   }
   std::optional<Gravity> gravity;
-  if (!arguments.gravity_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path, arguments.gravity_sigma_deg));
+  if (!arguments.gravity.path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity));
   }
   CAIRN_ASSIGN_OR_RETURN(PlaceBelief belief, PlaceBelief::Make(map, arguments.options));
   const Localizer localizer(map, arguments.localizer_options);
@@ -197,16 +190,10 @@ Command WhereCommand() {
                      "in "
                      "common")
                 .Type("FILE");
-            parser
-                .Add("--gravity", arguments->gravity_path,
-                     "A line for each image, which way is up in the camera's frame: to the right, down and "
-                     "ahead (of a level camera 0 -1 0); poses that say otherwise are refuted")
-                .Type("FILE");
-            parser
-                .Add("--gravity-sigma-deg", arguments->gravity_sigma_deg,
-                     "Standard deviation of gravity's direction, degrees [2]")
-                .Range(1e-3, 90.0)
-                .Type("DEG");
+            arguments->gravity.Add(parser,
+                                   "A line for each image, which way is up in the camera's frame: to the "
+                                   "right, down and ahead (of "
+                                   "a level camera 0 -1 0); poses that say otherwise are refuted");
             parser.Add("--period", arguments->period_s, "Seconds from image to image [1]")
                 .Range(0.0, 1e6)
                 .Type("S");

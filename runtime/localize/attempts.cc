@@ -163,8 +163,7 @@ Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& s
     }
     landmarks.insert(landmarks.end(), seen.begin(), seen.end());
   }
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  SortUnique(&landmarks);
   return landmarks;
 }
 

@@ -11,6 +11,7 @@
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
 #include "runtime/localize/refine.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
@@ -237,8 +238,7 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
     landmarks.insert(landmarks.end(), image->landmarks.begin(), image->landmarks.end());
   }
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  SortUnique(&landmarks);
   return landmarks;
 }
 

@@ -144,8 +144,7 @@ int Sighting::num_features() const {
 std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
   std::vector<LandmarkIdx> landmarks;
   for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  SortUnique(&landmarks);
   return landmarks;
 }
 

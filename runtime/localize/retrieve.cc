@@ -20,11 +20,6 @@
 namespace cairn {
 namespace {
 
-void SortUnique(std::vector<LandmarkIdx>* landmarks) {
-  std::sort(landmarks->begin(), landmarks->end());
-  landmarks->erase(std::unique(landmarks->begin(), landmarks->end()), landmarks->end());
-}
-
 // From a place to the box of a block's camera centres, metres.
 double BoxDistance(const BlockEntry& entry, const Eigen::Vector3d& center) {
   return entry.centers.cast<double>().exteriorDistance(center);

@@ -8,6 +8,11 @@ size_t LandmarkSet::Position(LandmarkIdx landmark) const {
   return std::lower_bound(idx.begin(), idx.end(), landmark) - idx.begin();
 }
 
+void SortUnique(std::vector<LandmarkIdx>* landmarks) {
+  std::sort(landmarks->begin(), landmarks->end());
+  landmarks->erase(std::unique(landmarks->begin(), landmarks->end()), landmarks->end());
+}
+
 int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b) {
   int num_shared = 0;
   for (size_t i = 0, j = 0; i < a.size() && j < b.size();) {

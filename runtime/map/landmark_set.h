@@ -20,6 +20,8 @@ struct LandmarkSet {
   size_t Position(LandmarkIdx landmark) const;
 };
 
+// Ascending, each once.
+void SortUnique(std::vector<LandmarkIdx>* landmarks);
 // How many elements two ascending lists share.
 int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b);
 

@@ -259,8 +259,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
     CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near)));
     landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
-    std::sort(landmarks.begin(), landmarks.end());
-    landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+    SortUnique(&landmarks);
   }
   // In view: within the camera's half diagonal of the optical axis, plus the uncertainty.
   const Pose cam_from_world = map_->head().camera_from_given * prior.cam_from_world;

@@ -8,6 +8,7 @@
 #include "core/blocks/map_blocks.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/retrieve.h"
+#include "runtime/map/landmark_set.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
@@ -21,8 +22,7 @@ constexpr double kLeastHeadingShare = 0.05;
 std::vector<LandmarkIdx> LandmarksOf(const std::vector<SeenLandmark>& seen) {
   std::vector<LandmarkIdx> landmarks;
   for (const SeenLandmark& match : seen) landmarks.push_back(match.landmark);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  SortUnique(&landmarks);
   return landmarks;
 }
 

@@ -261,7 +261,10 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
                    "with scans: turn of the laser's heading to the left of the camera's, degrees")}) {
     table.push_back({.name = name, .value = value, .help = help, .min = -1000, .max = 1000});
   }
-  const OptionTable localizer = DescribeOptions(&o->localizer);
+  OptionTable localizer = DescribeOptions(&o->localizer);
+  std::erase_if(localizer, [](const Option& option) {  // images of a survey come without gravity
+    return option.name == "floor_up_sigma_deg" || option.name == "max_up_sigmas";
+  });
   table.insert(table.end(), localizer.begin(), localizer.end());
   return table;
 }

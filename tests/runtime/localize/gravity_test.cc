@@ -6,20 +6,10 @@
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
 namespace {
-
-const SyntheticRoom& Room() {
-  static const SyntheticRoom room = MakeSyntheticRoom(1);
-  return room;
-}
-
-std::shared_ptr<const Map> RoomMap() {
-  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
-  return map;
-}
 
 // Turned by a normal error of so many degrees per axis.
 Eigen::Vector3d Sensed(const Eigen::Vector3d& up, double sigma_deg, Random& random) {
