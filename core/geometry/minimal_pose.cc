@@ -102,7 +102,7 @@ class ThreeDepths {
         least_squared_(std::min({(points[0] - points[1]).squaredNorm(), (points[0] - points[2]).squaredNorm(),
                                  (points[1] - points[2]).squaredNorm()})) {}
 
-  std::vector<Eigen::Vector3d> Solve() const {
+  ShortList<Eigen::Vector3d, kMaxDegree> Solve() const {
     // With x fixed: y^2 + b1 y + c1 = 0, z^2 + b2 z + c2 = 0.
     const Polynomial b1 = MakePolynomial(xy_.y1, xy_.xy), c1 = MakePolynomial(xy_.constant, xy_.x1, 1);
     const Polynomial b2 = MakePolynomial(xz_.y1, xz_.xy), c2 = MakePolynomial(xz_.constant, xz_.x1, 1);
@@ -135,14 +135,14 @@ class ThreeDepths {
           kNearZero * ValueAt(magnitudes, degree, turns.x[i]))
         starts.Add(turns.x[i]);
     }
-    std::vector<Eigen::Vector3d> depths;
+    ShortList<Eigen::Vector3d, kMaxDegree> depths;
     const auto polish = [&](const Eigen::Vector3d& start) {
       const std::optional<Eigen::Vector3d> found = Polished(start);
       constexpr double kSame = 1e-7;
       const bool is_new = found && std::none_of(depths.begin(), depths.end(), [&](const auto& known) {
                             return (known - *found).norm() <= kSame * found->norm();
                           });
-      if (is_new) depths.push_back(*found);
+      if (is_new && depths.size() < kMaxDegree) depths.push_back(*found);
       return is_new;
     };
     for (int i = 0; i < starts.num; ++i) {
@@ -217,8 +217,8 @@ Eigen::Matrix3d LevelFrom(const Eigen::Vector3d& up) {
 
 }  // namespace
 
-std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
-                                     const std::array<Eigen::Vector3d, 3>& points) {
+MinimalPoses PosesFromThreeRays(const std::array<RigRay, 3>& rays,
+                                const std::array<Eigen::Vector3d, 3>& points) {
   // In units of how far away the points are, more or less: powers of depths lose no digits then.
   double unit = 0;
   for (int i = 0; i < 3; ++i) {
@@ -235,7 +235,7 @@ std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
   }
   const Eigen::Matrix3d world_axes = Axes(scaled_points);
   if (!world_axes.allFinite() || world_axes.col(2).isZero()) return {};
-  std::vector<Pose> poses;
+  MinimalPoses poses;
   for (const Eigen::Vector3d& depths : ThreeDepths(scaled_rays, scaled_points).Solve()) {
     std::array<Eigen::Vector3d, 3> in_rig;
     for (int i = 0; i < 3; ++i) in_rig[i] = scaled_rays[i].origin + depths[i] * scaled_rays[i].direction;
@@ -249,9 +249,8 @@ std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
   return poses;
 }
 
-std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
-                                   const std::array<Eigen::Vector3d, 2>& points,
-                                   const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world) {
+MinimalPoses PosesFromTwoRays(const std::array<RigRay, 2>& rays, const std::array<Eigen::Vector3d, 2>& points,
+                              const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world) {
   // In level frames, z up, only the heading is open.
   const Eigen::Matrix3d level_from_rig = LevelFrom(up_in_rig), level_from_world = LevelFrom(up_in_world);
   std::array<Eigen::Vector3d, 2> d;
@@ -274,7 +273,7 @@ std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
   const double discriminant =
       half_linear * half_linear - quadratic * (a.squaredNorm() - apart.head<2>().squaredNorm());
   if (!(quadratic > 0) || !(discriminant >= 0)) return {};
-  std::vector<Pose> poses;
+  MinimalPoses poses;
   for (const double root : {-std::sqrt(discriminant), std::sqrt(discriminant)}) {
     const double free_depth = (root - half_linear) / quadratic;
     const double solved_depth = constant + slope * free_depth;

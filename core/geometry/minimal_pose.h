@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include <Eigen/Core>
 
+#include "core/base/short_list.h"
 #include "core/geometry/pose.h"
 
 namespace cairn {
@@ -19,14 +19,14 @@ struct RigRay {
 // Nister & Stewenius, "A minimal solution to the generalised 3-point pose problem", 2007; here by the
 // resultant of the three distances' equations).  None where the rays do not determine it: parallel ones, or
 // points in a line.
-std::vector<Pose> PosesFromThreeRays(const std::array<RigRay, 3>& rays,
-                                     const std::array<Eigen::Vector3d, 3>& points);
+using MinimalPoses = ShortList<Pose, 8>;
+MinimalPoses PosesFromThreeRays(const std::array<RigRay, 3>& rays,
+                                const std::array<Eigen::Vector3d, 3>& points);
 
 // The same of two points and a direction that is known in both frames, up say, of length 1 in each: at most 2
 // (Kukelova, Bujnak, Pajdla, "Closed-form solutions to minimal absolute pose problems with known vertical
 // direction", 2010).  Two points on the horizon do not determine it.
-std::vector<Pose> PosesFromTwoRays(const std::array<RigRay, 2>& rays,
-                                   const std::array<Eigen::Vector3d, 2>& points,
-                                   const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world);
+MinimalPoses PosesFromTwoRays(const std::array<RigRay, 2>& rays, const std::array<Eigen::Vector3d, 2>& points,
+                              const Eigen::Vector3d& up_in_rig, const Eigen::Vector3d& up_in_world);
 
 }  // namespace cairn

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <set>
-#include <tuple>
 #include <utility>
 
 #include "runtime/localize/place_evidence.h"
@@ -71,14 +69,18 @@ std::vector<Explanation> PlacesOf(const std::vector<Localization>& found, const 
 }
 
 int NumCells(const Sighting& sighting, const std::vector<Correspondence>& inliers, int grid) {
-  std::set<std::tuple<int, int, int>> cells;
+  const auto side = static_cast<size_t>(grid) + 1;  // the last of pixels on the image's edge
+  std::vector<char> cells(sighting.images.size() * side * side);
+  const auto cell = [&](float coordinate, int size) {
+    return static_cast<size_t>(std::clamp(static_cast<int>(coordinate * grid / size), 0, grid));
+  };
   for (const Correspondence& inlier : inliers) {
     const Query& query = sighting.images[inlier.image];
     const Keypoint& keypoint = query.features.keypoints[inlier.keypoint];
-    cells.emplace(inlier.image, static_cast<int>(keypoint.x * grid / query.camera.width),
-                  static_cast<int>(keypoint.y * grid / query.camera.height));
+    const size_t row = inlier.image * side + cell(keypoint.y, query.camera.height);
+    cells[row * side + cell(keypoint.x, query.camera.width)] = 1;
   }
-  return static_cast<int>(cells.size());
+  return static_cast<int>(std::ranges::count(cells, 1));
 }
 
 double Log10Choose(int n, int k) {

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <utility>
-
-#include <opencv2/calib3d.hpp>
 
 #include "core/base/random.h"
 #include "core/geometry/minimal_pose.h"
 #include "runtime/localize/refine.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
@@ -63,6 +61,7 @@ double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
 std::vector<int> Inliers(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit) {
   CamerasAt cameras(pose);
   std::vector<int> inliers;
+  inliers.reserve(measurements.size());
   for (size_t i = 0; i < measurements.size(); ++i) {
     if (cameras.TruncatedError(measurements[i], limit) < limit) inliers.push_back(static_cast<int>(i));
   }
@@ -70,34 +69,6 @@ std::vector<int> Inliers(const std::vector<PoseMeasurement>& measurements, const
 }
 
 using Sample = std::array<int, kMaxSampleSize>;  // indices of measurements
-
-// Of one camera: its poses.
-std::vector<Pose> SolveThreePointsOfCamera(const std::vector<PoseMeasurement>& measurements,
-                                           const Sample& sample) {
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> rays;
-  // Relative to the first point: P3P loses digits far from the origin.
-  const Eigen::Vector3d origin = measurements[sample[0]].point;
-  for (const int i : sample) {
-    const Eigen::Vector3d point = measurements[i].point - origin;
-    points.emplace_back(point.x(), point.y(), point.z());
-    rays.emplace_back(measurements[i].ray.ray.x(), measurements[i].ray.ray.y());
-  }
-  std::vector<cv::Mat> rotations, translations;
-  cv::solveP3P(points, rays, cv::Matx33d::eye(), cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
-  std::vector<Pose> poses;
-  for (size_t k = 0; k < rotations.size(); ++k) {
-    const Eigen::Vector3d rotation(rotations[k].ptr<double>());
-    const Eigen::Vector3d translation(translations[k].ptr<double>());
-    if (!rotation.allFinite() || !translation.allFinite()) continue;
-    Vector6d xi;
-    xi << rotation, translation;
-    Pose pose = Perturb(Pose(), xi);
-    pose.translation -= pose.rotation * origin;
-    poses.push_back(pose);
-  }
-  return poses;
-}
 
 RigRay RayOf(const PoseMeasurement& measurement) {
   const Eigen::Vector3d in_camera = measurement.ray.ray.homogeneous().normalized();
@@ -118,33 +89,21 @@ std::pair<std::array<RigRay, N>, std::array<Eigen::Vector3d, N>> RaysAndPointsOf
   return {rays, points};
 }
 
-std::vector<Pose> SolveThreePoints(const std::vector<PoseMeasurement>& measurements, const Sample& sample) {
-  const PoseMeasurement& first = measurements[sample[0]];
-  if (std::all_of(sample.begin(), sample.end(),
-                  [&](int i) { return measurements[i].image == first.image; })) {
-    std::vector<Pose> poses = SolveThreePointsOfCamera(measurements, sample);
-    if (first.cam_from_rig) {
-      for (Pose& pose : poses) pose = first.cam_from_rig->Inverse() * pose;
-    }
-    return poses;
+// The poses that a sample leads to.
+MinimalPoses Solve(const std::vector<PoseMeasurement>& measurements, const Sample& sample, int sample_size,
+                   const std::optional<UpMeasurement>& up) {
+  if (sample_size == 2) {
+    const auto [rays, points] = RaysAndPointsOf<2>(measurements, sample);
+    return PosesFromTwoRays(rays, points, up->in_rig, up->in_world);
   }
   const auto [rays, points] = RaysAndPointsOf<3>(measurements, sample);
-  return PosesFromThreeRays(rays, points);
-}
-
-std::vector<Pose> SolveTwoPoints(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
-                                 const UpMeasurement& up) {
-  const auto [rays, points] = RaysAndPointsOf<2>(measurements, sample);
-  return PosesFromTwoRays(rays, points, up.in_rig, up.in_world);
-}
-
-// The poses that a sample leads to.
-std::vector<Pose> Solve(const std::vector<PoseMeasurement>& measurements, const Sample& sample,
-                        int sample_size, const std::optional<UpMeasurement>& up) {
-  if (sample_size == 2) return SolveTwoPoints(measurements, sample, *up);
-  std::vector<Pose> poses = SolveThreePoints(measurements, sample);
-  if (up) std::erase_if(poses, [&](const Pose& pose) { return UpErrorInSigmas(*up, pose) > up->max_sigmas; });
-  return poses;
+  const MinimalPoses all = PosesFromThreeRays(rays, points);
+  if (!up) return all;
+  MinimalPoses upright;
+  for (const Pose& pose : all) {
+    if (UpErrorInSigmas(*up, pose) <= up->max_sigmas) upright.push_back(pose);
+  }
+  return upright;
 }
 
 Sample DrawSample(int num_measurements, int sample_size, Random& random) {
@@ -194,9 +153,7 @@ double ScoreNeeded(const std::vector<ScoredPose>& best, int max_num_poses, doubl
 
 // Whether they are of the same matches, most of them.
 bool IsSame(const std::vector<int>& a, const std::vector<int>& b) {
-  std::vector<int> both;
-  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));
-  return 10 * both.size() > 9 * std::min(a.size(), b.size());
+  return 10 * static_cast<size_t>(NumShared(a, b)) > 9 * std::min(a.size(), b.size());
 }
 
 // Puts a pose into a list by score, unless a better one has the same inliers; worse ones with the same leave.

@@ -23,9 +23,9 @@ struct PoseEstimate {
 bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options);
 
-// Pose from correspondences of which many are wrong: RANSAC over three points of a camera (P3P, OpenCV) or of
-// several (core/geometry/minimal_pose.h), or over two and up; truncated squared errors as score, each best
-// pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler, "Locally Optimized RANSAC", 2003).
+// Pose from correspondences of which many are wrong: RANSAC over three points, or over two and up
+// (core/geometry/minimal_pose.h); truncated squared errors as score, each best pose so far refined over its
+// inliers (LO-RANSAC: Chum, Matas, Kittler, "Locally Optimized RANSAC", 2003).
 // Same measurements and seed, same result.
 //
 // Up to so many poses, the best first: no two share more than nine tenths of the fewer inliers, and one

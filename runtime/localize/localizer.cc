@@ -26,6 +26,7 @@ namespace {
 std::vector<Correspondence> Select(const std::vector<Correspondence>& correspondences,
                                    const std::vector<int>& indices) {
   std::vector<Correspondence> selected;
+  selected.reserve(indices.size());
   for (const int i : indices) selected.push_back(correspondences[i]);
   return selected;
 }

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
+#include <numeric>
 #include <utility>
 
 #include "core/blocks/map_blocks.h"
@@ -22,13 +21,17 @@ class KeypointGrid {
   KeypointGrid(const Query& query, double cell_px) : query_(query), cell_px_(cell_px) {
     num_columns_ = static_cast<int>(query.camera.width / cell_px) + 1;
     num_rows_ = static_cast<int>(query.camera.height / cell_px) + 1;
-    cells_.resize(static_cast<size_t>(num_columns_) * num_rows_);
-    for (KeypointIdx i = 0; i < query.features.keypoints.size(); ++i) {
-      if (!query.rays[i]) continue;
-      const Keypoint& keypoint = query.features.keypoints[i];
-      cells_[static_cast<size_t>(Clamp(keypoint.y, num_rows_)) * num_columns_ +
-             Clamp(keypoint.x, num_columns_)]
-          .push_back(i);
+    first_of_cell_.assign(static_cast<size_t>(num_columns_) * num_rows_ + 1, 0);
+    const size_t num = query.features.keypoints.size();
+    for (size_t i = 0; i < num; ++i) {
+      if (query.rays[i]) ++first_of_cell_[CellOf(query.features.keypoints[i])];
+    }
+    // Where each cell ends; counted down to where it begins.
+    std::partial_sum(first_of_cell_.begin(), first_of_cell_.end(), first_of_cell_.begin());
+    keypoints_.resize(first_of_cell_.back());
+    for (size_t i = num; i-- > 0;) {
+      if (query.rays[i])
+        keypoints_[--first_of_cell_[CellOf(query.features.keypoints[i])]] = static_cast<KeypointIdx>(i);
     }
   }
 
@@ -38,7 +41,9 @@ class KeypointGrid {
          ++row) {
       for (int col = Clamp(pixel.x() - radius_px, num_columns_);
            col <= Clamp(pixel.x() + radius_px, num_columns_); ++col) {
-        for (const KeypointIdx i : cells_[static_cast<size_t>(row) * num_columns_ + col]) {
+        const size_t cell = static_cast<size_t>(row) * num_columns_ + col;
+        for (uint32_t k = first_of_cell_[cell]; k < first_of_cell_[cell + 1]; ++k) {
+          const KeypointIdx i = keypoints_[k];
           const Keypoint& keypoint = query_.features.keypoints[i];
           const double dx = keypoint.x - pixel.x(), dy = keypoint.y - pixel.y();
           if (dx * dx + dy * dy <= radius_px * radius_px) visit(i);
@@ -51,12 +56,16 @@ class KeypointGrid {
   int Clamp(double coordinate, int count) const {
     return static_cast<int>(std::clamp(coordinate / cell_px_, 0.0, static_cast<double>(count - 1)));
   }
+  size_t CellOf(const Keypoint& keypoint) const {
+    return static_cast<size_t>(Clamp(keypoint.y, num_rows_)) * num_columns_ + Clamp(keypoint.x, num_columns_);
+  }
 
   const Query& query_;
   double cell_px_;
   int num_columns_ = 0;
   int num_rows_ = 0;
-  std::vector<std::vector<KeypointIdx>> cells_;
+  std::vector<uint32_t> first_of_cell_;  // in keypoints_; one more than there are cells
+  std::vector<KeypointIdx> keypoints_;   // by cell
 };
 
 bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
@@ -101,6 +110,7 @@ class GuidedSearch {
         grid_(query, std::max(8.0, options.guided_radius_px)) {
     const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
     const double focal_px = query.camera.MeanFocal();
+    projected_.reserve(landmarks.idx.size());
     for (size_t k = 0; k < landmarks.idx.size(); ++k) {
       const MapLandmark& landmark = landmarks.landmarks[k];
       const Eigen::Vector3d point = cam_from_world * landmark.position;
@@ -117,7 +127,12 @@ class GuidedSearch {
     const double focal_px = query_.camera.MeanFocal();
     // An angle between RootSIFT vectors of norm 512 as a dot product.
     const double min_dot = kSquaredDescriptorNorm * std::cos(options_.guided_max_angle_rad);
-    std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
+    struct Best {
+      int32_t dot = -1;
+      LandmarkIdx landmark = 0;
+    };
+    std::vector<Best> best_of_keypoint(query_.features.keypoints.size());
+    size_t num_found = 0;
     for (const ProjectedLandmark& at : projected_) {
       const Eigen::Vector2d pixel = at.pixel + at.radius_px * moved_in_radii;
       if (!IsInImage(pixel, query_.camera)) continue;
@@ -131,14 +146,16 @@ class GuidedSearch {
         if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
       });
       if (best.second < 0 || best.first < min_dot) continue;
-      const LandmarkIdx landmark_idx = landmarks_.idx[at.k];
-      const auto [entry, inserted] =
-          best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
-      if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+      Best& known = best_of_keypoint[best.second];
+      if (known.dot < 0) ++num_found;
+      if (best.first > known.dot) known = {best.first, landmarks_.idx[at.k]};
     }
     std::vector<Correspondence> correspondences;
-    for (const auto& [keypoint, match] : best_of_keypoint)
-      correspondences.push_back({keypoint, match.second});
+    correspondences.reserve(num_found);
+    for (size_t i = 0; i < best_of_keypoint.size(); ++i) {
+      if (best_of_keypoint[i].dot >= 0)
+        correspondences.push_back({static_cast<KeypointIdx>(i), best_of_keypoint[i].landmark});
+    }
     return correspondences;
   }
 
@@ -215,15 +232,16 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
 
 Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
                                                     const MatchOptions& options) {
-  std::set<int32_t> image_blocks;  // those that a landmark's block names
+  std::vector<int32_t> image_blocks;  // those that a landmark's block names
   int64_t ordinal = -1;
   for (const LandmarkIdx landmark : seen) {
     const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
     if (next == ordinal) continue;
     ordinal = next;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
-    image_blocks.insert(block->image_blocks.begin(), block->image_blocks.end());
+    image_blocks.insert(image_blocks.end(), block->image_blocks.begin(), block->image_blocks.end());
   }
+  SortUnique(&image_blocks);
   std::vector<std::pair<int, int32_t>> order;
   for (const int32_t image_block : image_blocks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));

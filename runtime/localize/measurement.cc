@@ -143,6 +143,7 @@ int Sighting::num_features() const {
 
 std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
   std::vector<LandmarkIdx> landmarks;
+  landmarks.reserve(correspondences.size());
   for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
   SortUnique(&landmarks);
   return landmarks;

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "core/blocks/map_rows.h"
 #include "core/promise/view_distance.h"
 #include "runtime/localize/retrieve.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
@@ -25,23 +25,33 @@ int CellOf(const Eigen::Vector2d& pixel, const Camera& camera, int num_cells) {
   return cell(pixel.y(), camera.height) * num_cells + cell(pixel.x(), camera.width);
 }
 
+double WeightOf(const NearView& view) { return 1 / (1 + view.squared_distance); }
+
 // What an image should show from there, by the survey images near.
 Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const Pose& cam_from_world,
                                       const std::vector<NearView>& near,
                                       const std::vector<LandmarkIdx>& found_idx, int num_cells) {
   PlaceEvidence evidence{.squared_distance = near.front().squared_distance};
-  std::map<LandmarkIdx, double> seen;  // sum of the weights of the images that see it
+  std::vector<std::shared_ptr<const MapImage>> images;
+  std::vector<LandmarkIdx> idx;
   double sum = 0;
   for (const NearView& view : near) {
-    const double weight = 1 / (1 + view.squared_distance);
-    sum += weight;
+    sum += WeightOf(view);
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(view.image));
-    for (const LandmarkIdx landmark : image->landmarks) seen[landmark] += weight;
+    idx.insert(idx.end(), image->landmarks.begin(), image->landmarks.end());
+    images.push_back(image);
   }
-  std::vector<LandmarkIdx> idx;
-  for (const auto& [landmark, weight] : seen) idx.push_back(landmark);
+  SortUnique(&idx);
+  std::vector<double> weights(idx.size(), 0);  // sums over the images that see it
+  for (size_t i = 0; i < images.size(); ++i) {
+    size_t k = 0;
+    for (const LandmarkIdx landmark : images[i]->landmarks) {  // ascending
+      while (idx[k] < landmark) ++k;
+      weights[k] += WeightOf(near[i]);
+    }
+  }
   CAIRN_ASSIGN_OR_RETURN(const auto expected, map.Gather(std::move(idx), false));
-  std::set<int> cells_expected, cells_found;
+  std::vector<char> cells_expected(static_cast<size_t>(num_cells) * num_cells), cells_found = cells_expected;
   for (size_t k = 0; k < expected->idx.size(); ++k) {
     const MapLandmark& landmark = expected->landmarks[k];
     const Eigen::Vector3d point = cam_from_world * landmark.position;
@@ -49,13 +59,13 @@ Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const 
     if (!pixel || !IsInImage(*pixel, query.camera) ||
         !WasLookedFor(landmark, DepthOfScale(query.camera, point), query))
       continue;
-    evidence.num_expected += seen.at(expected->idx[k]) / sum;
+    evidence.num_expected += weights[k] / sum;
     const int cell = CellOf(*pixel, query.camera, num_cells);
-    cells_expected.insert(cell);
-    if (std::binary_search(found_idx.begin(), found_idx.end(), expected->idx[k])) cells_found.insert(cell);
+    cells_expected[cell] = 1;
+    if (std::binary_search(found_idx.begin(), found_idx.end(), expected->idx[k])) cells_found[cell] = 1;
   }
-  evidence.num_cells_expected = static_cast<double>(cells_expected.size());
-  evidence.num_cells_found = static_cast<double>(cells_found.size());
+  evidence.num_cells_expected = static_cast<double>(std::ranges::count(cells_expected, 1));
+  evidence.num_cells_found = static_cast<double>(std::ranges::count(cells_found, 1));
   return evidence;
 }
 
@@ -67,6 +77,7 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, 
   PlaceEvidence evidence{.num_matched = num_matched};
   if (found.empty()) return evidence;
   std::vector<double> depths;
+  depths.reserve(found.size());
   std::vector<std::vector<LandmarkIdx>> found_idx(sighting.images.size());  // by each image
   for (const Correspondence& match : found) {
     const Query& query = sighting.images[match.image];

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -106,8 +106,10 @@ struct WeightedUp {
 
 // `scale`: of the robust loss; infinity for plain least squares.
 NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
-                                     double scale, const WeightedUp& up) {
+                                     double scale, const WeightedUp& up,
+                                     std::vector<Eigen::Matrix2d> memory = {}) {
   NormalEquations equations;
+  equations.informations = std::move(memory);
   if (up.up) {
     const UpError error = LineariseUp(*up.up, pose);
     equations.matrix.topLeftCorner<3, 3>() = up.Information() * error.jacobian.transpose() * error.jacobian;
@@ -152,8 +154,9 @@ double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEqua
 std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measurements, Pose pose,
                                        double scale, int max_num_iterations, const WeightedUp& up) {
   double damping = 1e-6;
+  NormalEquations equations;
   for (int iteration = 0; iteration < max_num_iterations; ++iteration) {
-    const NormalEquations equations = BuildNormalEquations(measurements, pose, scale, up);
+    equations = BuildNormalEquations(measurements, pose, scale, up, std::move(equations.informations));
     if (equations.num_points < 3) return std::nullopt;
     bool improved = false;
     double step_norm = 0;
@@ -181,6 +184,7 @@ std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measu
 std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurements,
                                     const std::vector<int>& indices) {
   std::vector<PoseMeasurement> selected;
+  selected.reserve(indices.size());
   for (const int i : indices) selected.push_back(measurements[i]);
   return selected;
 }
@@ -188,6 +192,7 @@ std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurem
 // Squared whitened residuals; infinite behind the camera.
 std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurements, const Pose& pose) {
   std::vector<double> squares;
+  squares.reserve(measurements.size());
   for (const PoseMeasurement& measurement : measurements) {
     const auto linearised = Linearise(measurement, pose);
     squares.push_back(linearised
@@ -219,10 +224,13 @@ double TruncationFactor(double limit) {
 
 // With how many others of its image a measurement's keypoint errs together, on the mean.  REQUIRES: any
 double MeanNumInImage(const std::vector<PoseMeasurement>& measurements) {
-  std::map<int, double> num_in_image;
-  for (const PoseMeasurement& measurement : measurements) ++num_in_image[measurement.image];
+  std::vector<double> num_in_image;
   double sum = 0;
-  for (const auto& [image, num] : num_in_image) sum += num * num;
+  for (const PoseMeasurement& measurement : measurements) {
+    if (measurement.image >= std::ssize(num_in_image)) num_in_image.resize(measurement.image + 1);
+    ++num_in_image[measurement.image];
+  }
+  for (const double num : num_in_image) sum += num * num;
   return sum / static_cast<double>(measurements.size());
 }
 
@@ -326,6 +334,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   refined.noise_variance = VarianceFromMedian(squares);
   for (int round = 0; round < 4; ++round) {
     std::vector<int> inliers;
+    inliers.reserve(squares.size());
     for (size_t i = 0; i < squares.size(); ++i) {
       if (squares[i] <= options.inlier_chi_square * refined.noise_variance)
         inliers.push_back(static_cast<int>(i));

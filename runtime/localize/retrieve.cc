@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "core/blocks/map_blocks.h"
@@ -228,22 +227,25 @@ Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& 
 Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
                                            double radius_deg, int max_num) {
   const Eigen::Vector3d center = cam_from_world.Center();
-  std::set<std::pair<double, int32_t>> nearest;  // squared distance, image
+  std::vector<NearView> nearest;  // ascending
+  nearest.reserve(max_num + 1);
+  const auto is_nearer = [](const NearView& a, const NearView& b) {
+    return std::pair(a.squared_distance, a.image) < std::pair(b.squared_distance, b.image);
+  };
   for (const auto& [least, ordinal] : ImageBlocksByDistance(map, center)) {
     const bool is_full = static_cast<int>(nearest.size()) == max_num;
-    if (is_full && std::pow(least / radius_m, 2) > nearest.rbegin()->first) break;
+    if (is_full && std::pow(least / radius_m, 2) > nearest.back().squared_distance) break;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
     for (size_t i = 0; i < block->images.size(); ++i) {
       const Pose& survey = block->images[i].cam_from_world;
-      nearest.emplace(std::pow(CenterErrorM(survey, cam_from_world) / radius_m, 2) +
-                          std::pow(RotationErrorDeg(survey, cam_from_world) / radius_deg, 2),
-                      block->first + static_cast<int32_t>(i));
-      if (static_cast<int>(nearest.size()) > max_num) nearest.erase(std::prev(nearest.end()));
+      const NearView view{block->first + static_cast<int32_t>(i),
+                          std::pow(CenterErrorM(survey, cam_from_world) / radius_m, 2) +
+                              std::pow(RotationErrorDeg(survey, cam_from_world) / radius_deg, 2)};
+      nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), view, is_nearer), view);
+      if (static_cast<int>(nearest.size()) > max_num) nearest.pop_back();
     }
   }
-  std::vector<NearView> views;
-  for (const auto& [squared_distance, image] : nearest) views.push_back({image, squared_distance});
-  return views;
+  return nearest;
 }
 
 Result<int32_t> ImageNearFix(const Map& map, const Localization& found) {
@@ -279,7 +281,7 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
 Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
   std::vector<LandmarkIdx> ascending = landmarks;
   std::sort(ascending.begin(), ascending.end());
-  std::map<RegionIdx, int> counts;
+  std::vector<RegionVotes> votes;
   int64_t ordinal = -1;
   for (const LandmarkIdx landmark : ascending) {
     const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
@@ -287,14 +289,25 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
     ordinal = next;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
     // [Sala06 §III] a vote for each region that it belongs to
-    for (const auto& [region, of_region] : block->regions) counts[region] += NumShared(of_region, ascending);
+    for (const auto& [region, of_region] : block->regions) {
+      const int num_shared = NumShared(of_region, ascending);
+      if (num_shared > 0) votes.push_back({region, num_shared});
+    }
   }
-  std::vector<RegionVotes> votes;
-  for (const auto& [region, count] : counts) {
-    if (count > 0) votes.push_back({region, count});
+  std::sort(votes.begin(), votes.end(),
+            [](const RegionVotes& a, const RegionVotes& b) { return a.region < b.region; });
+  size_t num_regions = 0;
+  for (const RegionVotes& vote : votes) {
+    if (num_regions > 0 && votes[num_regions - 1].region == vote.region) {
+      votes[num_regions - 1].num_votes += vote.num_votes;
+    } else {
+      votes[num_regions++] = vote;
+    }
   }
-  std::stable_sort(votes.begin(), votes.end(),
-                   [](const RegionVotes& a, const RegionVotes& b) { return a.num_votes > b.num_votes; });
+  votes.resize(num_regions);
+  std::sort(votes.begin(), votes.end(), [](const RegionVotes& a, const RegionVotes& b) {
+    return std::pair(-a.num_votes, a.region) < std::pair(-b.num_votes, b.region);
+  });
   return votes;
 }
 

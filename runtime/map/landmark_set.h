@@ -20,7 +20,7 @@ struct LandmarkSet {
   size_t Position(LandmarkIdx landmark) const;
 };
 
-// Ascending, each once.
+// Ascending, each once; of any indices.
 void SortUnique(std::vector<LandmarkIdx>* landmarks);
 // How many elements two ascending lists share.
 int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b);

@@ -33,7 +33,7 @@ void LookAt(const Pose& rig_from_world, double extent_m, Random& random, std::ar
 }
 
 // How far the nearest of these poses is from another, metres and radians together.
-double Nearest(const std::vector<Pose>& poses, const Pose& truth) {
+double Nearest(const MinimalPoses& poses, const Pose& truth) {
   double nearest = 1e9;
   for (const Pose& pose : poses)
     nearest = std::min(nearest, CenterErrorM(pose, truth) + RadFromDeg(RotationErrorDeg(pose, truth)));
@@ -62,7 +62,7 @@ TEST(PosesFromThreeRays, TheTruePoseIsAmongThemAndAllPutThePointsOnTheRays) {
       std::array<RigRay, 3> rays;
       std::array<Eigen::Vector3d, 3> points;
       LookAt(truth, extent_m, random, &rays, &points);
-      const std::vector<Pose> poses = PosesFromThreeRays(rays, points);
+      const MinimalPoses poses = PosesFromThreeRays(rays, points);
       EXPECT_LE(poses.size(), 8U);
       for (const Pose& pose : poses) EXPECT_LT(WorstMiss(pose, rays, points), 1e-5);
       num_found += Nearest(poses, truth) < 1e-5 ? 1 : 0;
@@ -88,7 +88,7 @@ TEST(PosesFromThreeRays, SmallTrianglesFarAwayHaveThemToo) {
         rays[i].direction = (seen - rays[i].origin).normalized();
         points[i] = truth.Inverse() * seen;
       }
-      const std::vector<Pose> poses = PosesFromThreeRays(rays, points);
+      const MinimalPoses poses = PosesFromThreeRays(rays, points);
       for (const Pose& pose : poses) EXPECT_LT(WorstMiss(pose, rays, points), 1e-4);
       num_found += Nearest(poses, truth) < 1e-3 * depth_m ? 1 : 0;
     }
@@ -115,7 +115,7 @@ TEST(PosesFromThreeRays, OfOneCameraTheyAreThoseOfTheThreePointProblem) {
     std::vector<cv::Mat> rotations, translations;
     cv::solveP3P(cv_points, cv_rays, cv::Matx33d::eye(), cv::noArray(), rotations, translations,
                  cv::SOLVEPNP_AP3P);
-    const std::vector<Pose> poses = PosesFromThreeRays(rays, points);
+    const MinimalPoses poses = PosesFromThreeRays(rays, points);
     for (size_t k = 0; k < rotations.size(); ++k) {
       const Eigen::Vector3d rotation(rotations[k].ptr<double>());
       const Pose pose{Eigen::Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())),
@@ -156,7 +156,7 @@ TEST(PosesFromTwoRays, TheTruePoseIsAmongThemAndAllKeepUpUp) {
       LookAt(truth, extent_m, random, &rays, &points);
       const Eigen::Vector3d up_in_world = RandomVector(random, 1).normalized();
       const Eigen::Vector3d up_in_rig = truth.rotation * up_in_world;
-      const std::vector<Pose> poses = PosesFromTwoRays(rays, points, up_in_rig, up_in_world);
+      const MinimalPoses poses = PosesFromTwoRays(rays, points, up_in_rig, up_in_world);
       EXPECT_LE(poses.size(), 2U);
       for (const Pose& pose : poses) {
         EXPECT_LT(WorstMiss(pose, rays, points), 1e-4);
