@@ -79,6 +79,8 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("gravity", &p->gravity);
   reader.Read("gravity_sigma_deg", &p->gravity_sigma_deg);
   reader.Read("imu_in_robot", &p->imu_in_robot);
+  reader.Read("budget_ms", &p->budget_ms);
+  reader.Read("core_speed", &p->core_speed);
   reader.Read("camera_model", &p->camera_model);
   reader.Read("camera_params", &p->camera_params);
   reader.Read("log", &p->log);
@@ -316,6 +318,7 @@ class LocalizerNode {
                      KeyValue("region", answer.region),
                      KeyValue("scope", answer.scope),
                      KeyValue("probability", answer.probability),
+                     KeyValue("work_ms", answer.work_ms),
                      KeyValue("library_ms", answer.library_ms),
                      KeyValue("node_ms", node_ms),
                      KeyValue("kept_bytes", localizer_->num_kept_bytes()),

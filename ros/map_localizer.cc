@@ -58,8 +58,8 @@ struct MapLocalizer::State {
       : parameters(std::move(given)),
         map(std::move(opened)),
         robot_from_camera(mounting),
-        localizer(map),
-        tracker(map),
+        localizer(map, WithBudget(parameters)),
+        tracker(map, WithBudget(parameters)),
         odometry(mounting),
         starts(map, mounting, parameters.steer) {}
 
@@ -76,6 +76,13 @@ struct MapLocalizer::State {
   std::optional<Gravity> gravity;          // with Parameters::gravity
   double place_probability = 0;            // of the last fix's place
 
+  static LocalizerOptions WithBudget(const Parameters& parameters) {
+    LocalizerOptions options;
+    options.budget_ms = parameters.budget_ms;
+    options.core_speed = parameters.core_speed;
+    return options;
+  }
+
   // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, SharedLog::Open.
   Status Begin() {
     if (parameters.steer) {
@@ -89,6 +96,7 @@ struct MapLocalizer::State {
       return MakeError(
           ErrorCode::kInvalidArgument,
           "~min_place_probability is of the places that ~where finds; set that, or leave it out");
+    CAIRN_RETURN_IF_ERROR(CheckBudget());
     if (parameters.gravity) {
       CAIRN_RETURN_IF_ERROR(BeginGravity());
     }
@@ -99,6 +107,16 @@ struct MapLocalizer::State {
     if (parameters.log.empty()) return Ok();
     CAIRN_ASSIGN_OR_RETURN(log, SharedLog::Open(parameters.log, *map, parameters.log_max_mb_per_day));
     return Ok();
+  }
+
+  Status CheckBudget() const {
+    LocalizerOptions options = WithBudget(parameters);
+    CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&options)));
+    if (parameters.budget_ms == 0 || !parameters.where) return Ok();
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "~budget_ms bounds the work of a fix, and what ~where finds takes more; leave one of them "
+        "out");
   }
 
   Status BeginGravity() {
@@ -163,7 +181,7 @@ struct MapLocalizer::State {
       };
       place_probability = probability_of(*found);
       if (needed > 0 && is_followed && place_probability < needed && probability_of(alone) >= needed) {
-        tracker = RegionTracker(map);  // it followed a look-alike
+        tracker = RegionTracker(map, WithBudget(parameters));  // it followed a look-alike
         CAIRN_ASSIGN_OR_RETURN(*found, tracker.TrackFrame(frame));
         place_probability = probability_of(*found);
       }
@@ -252,6 +270,7 @@ Answer MapLocalizer::Locate(const Image& image) {
   answer.region = found->region;
   answer.scope = ScopeName(found->scope);
   answer.probability = found->probability;
+  answer.work_ms = found->work_ms;
   if (!answer.has_fix) return answer;
   const RobotPose pose = RobotPoseOf(*found, state_->robot_from_camera);
   std::copy_n(pose.position.data(), 3, answer.position);

@@ -25,6 +25,10 @@ struct Parameters {
   bool gravity = false;
   double gravity_sigma_deg = 2;
   std::vector<double> imu_in_robot;
+  // Most work for an image (LocalizerOptions), ms of a core that is core_speed times as fast as the one on
+  // which it was measured; 0: any.
+  double budget_ms = 0;
+  double core_speed = 1;
   std::string camera_model;  // COLMAP's name; empty: the map's camera of the image's size
   std::vector<double> camera_params;
   std::string log;  // folder of a log (docs/robots.md); empty: none
@@ -78,6 +82,7 @@ struct Answer {
   int num_features = 0, num_inliers = 0, region = -1;
   std::string scope;             // among which landmarks it was found
   double probability = 0;        // that the fix is right
+  double work_ms = 0;            // what the answer took, as budget_ms is counted
   double library_ms = 0;         // in the runtime: the rest is the node's
   std::optional<Places> places;  // of an image by which whereabouts were looked for
 };

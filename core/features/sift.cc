@@ -126,6 +126,11 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   return ExtractFromSmaller(grey, options, mask, {}, {});
 }
 
+int64_t NumSiftPixels(cv::Size image, const SiftOptions& options) {
+  const double ratio = SmallerRatio(image, options);
+  return std::llround(ratio * ratio * image.width * image.height);
+}
+
 double CoarseSiftScalePx(cv::Size image, const SiftOptions& options) {
   return kOctaveOneScalePx / SmallerRatio(image, options);
 }
@@ -134,7 +139,8 @@ Result<Features> ExtractUndoubledSift(const cv::Mat& grey, const SiftOptions& op
                                       const std::function<bool(const Keypoint&)>& is_wanted) {
   CAIRN_RETURN_IF_ERROR(CheckGrey(grey));
   SiftSearch search{.doubled = false};
-  (scales == SiftScales::kCoarse ? search.first_octave : search.end_octave) = 1;
+  if (scales == SiftScales::kCoarse) search.first_octave = 1;
+  if (scales == SiftScales::kFine) search.end_octave = 1;
   return ExtractFromSmaller(grey, options, {}, search, is_wanted);
 }
 

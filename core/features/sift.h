@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 
 #include <opencv2/core/mat.hpp>
@@ -30,14 +31,16 @@ OptionTable DescribeOptions(SiftOptions* options);
 // gives no features, not an error.  Errors: InvalidArgument for an image or mask of another type or size.
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask = {});
 
-// Scales of features, in octaves of their own: above and below CoarseSiftScalePx.
-enum class SiftScales { kCoarse, kFine };
+// Scales of features, in octaves of their own: above and below CoarseSiftScalePx, or both.
+enum class SiftScales { kCoarse, kFine, kAll };
+// Pixels of an image, as it is when features are sought.
+int64_t NumSiftPixels(cv::Size image, const SiftOptions& options);
 // Least scale of an image's coarse features, sigma, px of the image.
 double CoarseSiftScalePx(cv::Size image, const SiftOptions& options);
 
 // Features of these scales from the image's own pixels, not from the doubled image's (SiftSearch::doubled):
-// as many of them show a map's landmarks as of ExtractSift's.  The coarse ones take a quarter of its time,
-// the fine ones about as much, and those of them that are not wanted a tenth.  Order and errors: as
+// as many of them show a map's landmarks as of ExtractSift's.  All take half of its time, the coarse ones a
+// quarter, the fine ones about as much, and those of them that are not wanted a tenth.  Order and errors: as
 // ExtractSift.
 Result<Features> ExtractUndoubledSift(const cv::Mat& grey, const SiftOptions& options, SiftScales scales,
                                       const std::function<bool(const Keypoint&)>& is_wanted = {});

@@ -1,5 +1,6 @@
 #include "pipeline/commands/localization_json.h"
 
+#include <cmath>
 #include <vector>
 
 namespace cairn::pipeline {
@@ -36,6 +37,7 @@ nlohmann::ordered_json LocalizationJson(const Localization& found) {
     if (!found.possible_poses.empty()) json["possible_probabilities"] = found.possible_probabilities;
   }
   json["scope"] = ScopeName(found.scope);
+  json["work_ms"] = std::round(100 * found.work_ms) / 100;
   json["num_features"] = found.num_features;
   json["num_matches"] = found.num_matches;
   json["num_inliers"] = found.num_inliers;

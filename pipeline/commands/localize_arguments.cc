@@ -39,6 +39,10 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   }
   CAIRN_RETURN_IF_ERROR(arguments.gravity.Check(
       arguments.option_arguments, {"floor_up_sigma_deg", "max_up_sigmas", "place_map_up_sigma_deg"}));
+  if (arguments.estimator != "pnp") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"budget_ms", "core_speed"}, "bounds the work of --estimator pnp alone; leave it out"));
+  }
   if (arguments.sure_options.min_place_probability == 0 && arguments.period_s > 0)
     return MakeError(ErrorCode::kInvalidArgument,
                      "--period is for --min-place-probability; give it, 0.9 say, or leave this out");

@@ -105,6 +105,9 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"reach_links"}, "is for images without odometry; leave it out"));
   }
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+      {"budget_ms", "core_speed"},
+      "bounds the work of a fix, and a belief over places takes more; leave it out"));
   CAIRN_RETURN_IF_ERROR(arguments.gravity.Check(arguments.option_arguments,
                                                 {"map_up_sigma_deg", "floor_up_sigma_deg", "max_up_sigmas"}));
   cv::setNumThreads(1);

@@ -92,6 +92,11 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
   return WithoutExceptions("localization", [&]() -> Result<AtlasAnswer> {
     AtlasLocalizerOptions checked = options_;
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+    if (localizer_options_.budget_ms > 0)
+      return MakeError(
+          ErrorCode::kUnsupported,
+          "budget_ms bounds the work of an answer in one map, and an atlas tries several; localize "
+          "in a map, or leave it out");
     const std::vector<MapScore> ranked = atlas_->Rank(features);
     AtlasAnswer answer;
     double best_probability = 0;

@@ -49,7 +49,7 @@ const char* cairn_error_name(int32_t code) {
 }
 
 const char* cairn_reason_name(int32_t reason) {
-  return reason < CAIRN_FIX || reason > CAIRN_TILTED ? "unknown" : NoFixName(static_cast<NoFix>(reason));
+  return reason < CAIRN_FIX || reason > CAIRN_OVER_BUDGET ? "unknown" : NoFixName(static_cast<NoFix>(reason));
 }
 
 const char* cairn_scope_name(int32_t scope) {

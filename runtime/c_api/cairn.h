@@ -73,7 +73,8 @@ enum {
   CAIRN_FAR_FROM_SURVEY = 8,
   CAIRN_AMBIGUOUS = 9,   /* another place explains the image nearly as well */
   CAIRN_IMPROBABLE = 10, /* most of what an image from there would show is missing */
-  CAIRN_TILTED = 11      /* up is not where it was sensed */
+  CAIRN_TILTED = 11,     /* up is not where it was sensed */
+  CAIRN_OVER_BUDGET = 12 /* what budget_ms allows was done before a fix was sure */
 };
 
 /* Which landmarks an image was matched with.  Append-only. */
@@ -236,9 +237,12 @@ typedef struct cairn_fix {
    * places explain.  Without a fix 0, but for CAIRN_IMPROBABLE, and for CAIRN_AMBIGUOUS: that one of several
    * poses is right. */
   double probability;
+  /* What the answer took: milliseconds of the core on which work was measured, counted and not timed; no more
+   * than the options budget_ms times core_speed. */
+  double work_ms;
 } cairn_fix;
 #define CAIRN_FIX_INIT \
-  { sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, {0}, 0, 0, 0 }
+  { sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, {0}, 0, 0, 0, 0 }
 
 /* A place on the floor, from how landmarks look from different places (maps with a visual map). */
 typedef struct cairn_floor_fix {

@@ -12,7 +12,7 @@
 namespace cairn {
 namespace {
 
-static_assert(CAIRN_TILTED == static_cast<int>(NoFix::kTilted));
+static_assert(CAIRN_OVER_BUDGET == static_cast<int>(NoFix::kOverBudget));
 static_assert(CAIRN_SCOPE_VOTES == static_cast<int>(Scope::kVotes));
 
 // A longer stride is an overflowed sum, not a distance between rows.
@@ -163,6 +163,7 @@ cairn_fix FixFrom(const Localization& found) {
   fix.num_inliers = found.num_inliers;
   fix.scope = static_cast<int32_t>(found.scope);
   fix.probability = found.probability;
+  fix.work_ms = found.work_ms;
   CopyText(found.message, fix.message);
   if (!found.has_fix()) return fix;
   CopyPose(found.cam_from_world, fix.rotation_wxyz, fix.translation_m);

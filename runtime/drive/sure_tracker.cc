@@ -69,6 +69,10 @@ Result<SureTracker> SureTracker::Make(std::shared_ptr<const Map> map,
                                       const SureTrackerOptions& options) {
   return WithoutExceptions("sure tracker", [&]() -> Result<SureTracker> {
     CAIRN_RETURN_IF_ERROR(CheckSureTracker(options));
+    if (options.min_place_probability > 0 && localizer_options.budget_ms > 0)
+      return MakeError(ErrorCode::kUnsupported,
+                       "budget_ms bounds the work of a fix, and a belief over places (min_place_probability) "
+                       "takes more; leave one of them out");
     SureTracker tracker(map, localizer_options, tracker_options, options);
     if (options.min_place_probability > 0) {
       CAIRN_ASSIGN_OR_RETURN(tracker.belief_, PlaceBelief::Make(std::move(map), options.belief));

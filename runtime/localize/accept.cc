@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/work/work_budget.h"
 #include "runtime/localize/place_evidence.h"
 
 namespace cairn {
@@ -102,6 +103,7 @@ double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Po
     const Eigen::Vector3d point = measurements[i].InCamera(rig_from_world * measurements[i].point);
     if (point.z() > 0) samples.push_back({&measurements[i], point.hnormalized()});
   }
+  if (!Spend(sighting.work, Work::kMatchPair, samples.size() * samples.size())) return 1;
   int64_t num_close = 0, num_pairs = 0;
   for (const Seen& keypoint : samples) {
     for (const Seen& landmark : samples) {
@@ -154,6 +156,8 @@ const char* NoFixName(NoFix reason) {
       return "improbable";
     case NoFix::kTilted:
       return "tilted";
+    case NoFix::kOverBudget:
+      return "over_budget";
   }
   return "none";
 }

@@ -9,6 +9,7 @@
 #include "core/base/quantiles.h"
 #include "core/blocks/map_rows.h"
 #include "core/promise/view_distance.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
@@ -16,6 +17,16 @@
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {
+namespace {
+
+// What a landmark takes that is looked for near its projection: from the map, in rounds, and beside it.
+int64_t PicosecondsOfGuided() {
+  constexpr int kNumPoses = 5, kNumRounds = 8, kNumNear = 3;
+  return WorkBudget::PicosecondsOf(Work::kLandmark) + kNumPoses * WorkBudget::PicosecondsOf(Work::kProject) +
+         kNumRounds * kNumNear * WorkBudget::PicosecondsOf(Work::kNear);
+}
+
+}  // namespace
 
 size_t Localizer::Attempt::num_landmarks() const {
   size_t num = 0;
@@ -36,8 +47,9 @@ Result<Localization> Localizer::LocalizeRig(const std::vector<RigImage>& images,
                                             const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize a rig", [&]() -> Result<Localization> {
     std::vector<Query> queries;
+    const Budget work = MakeBudget();
     for (const RigImage& image : images) {
-      CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromImage(image.grey, image.camera));
+      CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromImage(image.grey, image.camera, work));
       CAIRN_RETURN_IF_ERROR(PutOnRig(image.cam_from_rig, &query));
       queries.push_back(std::move(query));
     }
@@ -50,8 +62,9 @@ Result<Localization> Localizer::LocalizeRigFeatures(std::vector<RigFeatures> ima
                                                     const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize a rig", [&]() -> Result<Localization> {
     std::vector<Query> queries;
+    const Budget work = MakeBudget();
     for (RigFeatures& image : images) {
-      CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(image.features), image.camera));
+      CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(image.features), image.camera, work));
       CAIRN_RETURN_IF_ERROR(PutOnRig(image.cam_from_rig, &query));
       queries.push_back(std::move(query));
     }
@@ -81,6 +94,14 @@ Result<Localization> Localizer::LocalizeRigQueries(std::vector<Query> queries,
   return LocalizeQuery(Sighting(std::span<const Query>(queries)), prior);
 }
 
+int64_t Localizer::MaxNumMatched(const Query& query) const {
+  constexpr double kMatchPart = 0.4;
+  const int64_t of_landmark =
+      WorkBudget::PicosecondsOf(Work::kLandmark) +
+      std::ssize(query.features.keypoints) * WorkBudget::PicosecondsOf(Work::kDescriptorPair);
+  return NumAffordable(query.work.get(), of_landmark, kMatchPart);
+}
+
 PosePrior Localizer::PriorOfImage(const PosePrior& prior, const Query& query) const {
   const Pose& camera_from_given = map_->head().camera_from_given;
   PosePrior of_image = prior;
@@ -96,9 +117,10 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
       of_images{.scope = Scope::kImages};
   for (const Query& query : sighting.images) {
     if (prior) {
-      CAIRN_ASSIGN_OR_RETURN(const auto images,
-                             RetrieveByPrior(*map_, PriorOfImage(*prior, query), options_.retrieve));
-      CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(images)));
+      CAIRN_ASSIGN_OR_RETURN(const auto images, RetrieveByPrior(*map_, PriorOfImage(*prior, query),
+                                                                options_.retrieve, sighting.work));
+      CAIRN_ASSIGN_OR_RETURN(auto landmarks,
+                             LandmarksOfImages(*map_, ImagesOf(images), MaxNumMatched(query), sighting.work));
       near.landmarks.push_back(std::move(landmarks));
     }
     CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, options_.retrieve));
@@ -108,9 +130,11 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
         candidate_ids->push_back(image->image_id);
     }
     CAIRN_ASSIGN_OR_RETURN(const auto regions, RegionsOfCandidates(*map_, candidates, options_.retrieve));
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_regions, LandmarksOfRegions(*map_, regions));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_regions,
+                           LandmarksOfRegions(*map_, regions, MaxNumMatched(query), sighting.work));
     of_regions.landmarks.push_back(std::move(landmarks_of_regions));
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_images, LandmarksOfImages(*map_, ImagesOf(candidates)));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_images, LandmarksOfImages(*map_, ImagesOf(candidates),
+                                                                       MaxNumMatched(query), sighting.work));
     of_images.landmarks.push_back(std::move(landmarks_of_images));
   }
   std::vector<Attempt> attempts;
@@ -127,7 +151,11 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
   if (images_first) add(of_images);
   add(std::move(of_regions));
   add(std::move(of_images));
-  if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
+  const bool may_try_all = std::ranges::all_of(sighting.images, [&](const Query& query) {
+    return map_->num_landmarks() <=
+           std::min<int64_t>(options_.fall_back_max_num_landmarks, MaxNumMatched(query));
+  });
+  if (options_.fall_back_to_all && may_try_all) {
     std::vector<LandmarkIdx> all(map_->num_landmarks());
     std::iota(all.begin(), all.end(), 0);
     add(WithAllImages(Scope::kAll, std::move(all), sighting));
@@ -138,7 +166,11 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
 Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& sighting,
                                                                const std::vector<Correspondence>& inliers,
                                                                const Pose& rig_from_world) const {
-  if (sighting.num_images() == 1) return CovisibleLandmarks(*map_, LandmarksOf(inliers), options_.match);
+  constexpr double kGuidedPart = 0.5;
+  const int64_t max_num =
+      NumAffordable(sighting.work, PicosecondsOfGuided(), kGuidedPart / sighting.num_images());
+  if (sighting.num_images() == 1)
+    return CovisibleLandmarks(*map_, LandmarksOf(inliers), options_.match, max_num, sighting.work);
   CAIRN_ASSIGN_OR_RETURN(const auto matched, map_->Gather(LandmarksOf(inliers), false));
   std::vector<double> distances;
   for (const MapLandmark& landmark : matched->landmarks)
@@ -152,14 +184,15 @@ Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& s
                  [&](const Correspondence& inlier) { return inlier.image == i; });
     std::vector<LandmarkIdx> seen;
     if (!of_image.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(seen, CovisibleLandmarks(*map_, LandmarksOf(of_image), options_.match));
+      CAIRN_ASSIGN_OR_RETURN(
+          seen, CovisibleLandmarks(*map_, LandmarksOf(of_image), options_.match, max_num, sighting.work));
     } else {  // what the survey saw from near the place that the others give it
       CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
                              NearestViews(*map_, sighting.images[i].cam_from_rig * rig_from_world, radius_m,
                                           one_view.same_view_deg, options_.match.guided_num_images));
       std::vector<int32_t> images;
       for (const NearView& view : near) images.push_back(view.image);
-      CAIRN_ASSIGN_OR_RETURN(seen, LandmarksOfImages(*map_, images));
+      CAIRN_ASSIGN_OR_RETURN(seen, LandmarksOfImages(*map_, images, max_num, sighting.work));
     }
     landmarks.insert(landmarks.end(), seen.begin(), seen.end());
   }

@@ -7,6 +7,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/minimal_pose.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/refine.h"
 #include "runtime/map/landmark_set.h"
 
@@ -48,13 +49,13 @@ class CamerasAt {
 };
 
 // Sum of truncated errors; stops early once it exceeds `best`.
-double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit, double best) {
+double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit, double best,
+             WorkBudget* work) {
   CamerasAt cameras(pose);
   double sum = 0;
-  for (const PoseMeasurement& measurement : measurements) {
-    sum += cameras.TruncatedError(measurement, limit);
-    if (sum > best) break;
-  }
+  size_t num = 0;
+  while (num < measurements.size() && sum <= best) sum += cameras.TruncatedError(measurements[num++], limit);
+  Spend(work, Work::kScore, num);
   return sum;
 }
 
@@ -214,7 +215,8 @@ bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::
 
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
                                         const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed, const std::optional<UpMeasurement>& up) {
+                                        uint64_t seed, const std::optional<UpMeasurement>& up,
+                                        WorkBudget* work) {
   const int num_measurements = static_cast<int>(measurements.size());
   if (num_measurements < kMinNumInliers) return {};
   // An error of up moves points in the image.  Of those that are inliers all the same, local refinement finds
@@ -232,18 +234,18 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
   local_options.max_num_refine_iterations = 5;
   int num_iterations = std::max(options.min_num_ransac_iterations, options.max_num_ransac_iterations);
   int iteration = 0;
-  for (; iteration < num_iterations; ++iteration) {
+  for (; iteration < num_iterations && Spend(work, Work::kSample, 1); ++iteration) {
     const int size = alternates && iteration % 2 == 1 ? 3 : sample_size;
     const Sample sample = DrawSample(num_measurements, size, random);
     for (const Pose& pose : Solve(measurements, sample, size, up)) {
       const double needed = ScoreNeeded(best, max_num_poses, limit, num_measurements);
-      double score = Score(measurements, pose, limit, needed);
+      double score = Score(measurements, pose, limit, needed, work);
       if (score >= needed) continue;
       Pose local = pose;
       std::vector<int> inliers = Inliers(measurements, pose, limit);
       for (int round = 0; round < 3 && inliers.size() >= kMinNumInliers; ++round) {
-        const auto refined = RefinePose(Select(measurements, inliers), local, local_options, up);
-        const double refined_score = refined ? Score(measurements, *refined, limit, score) : score;
+        const auto refined = RefinePose(Select(measurements, inliers), local, local_options, up, work);
+        const double refined_score = refined ? Score(measurements, *refined, limit, score, work) : score;
         if (!(refined_score < score)) break;
         local = *refined;
         score = refined_score;
@@ -265,8 +267,9 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
 
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
-                                         uint64_t seed, const std::optional<UpMeasurement>& up) {
-  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed, up);
+                                         uint64_t seed, const std::optional<UpMeasurement>& up,
+                                         WorkBudget* work) {
+  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed, up, work);
   if (poses.empty()) return std::nullopt;
   return std::move(poses.front());
 }
@@ -274,7 +277,7 @@ std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& mea
 std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
                                               const RefineOptions& refine_options, uint64_t seed,
-                                              const std::optional<UpMeasurement>& up) {
+                                              const std::optional<UpMeasurement>& up, WorkBudget* work) {
   std::vector<int> indices;
   for (size_t i = 0, next = 0; i < measurements.size(); ++i) {
     if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
@@ -283,7 +286,7 @@ std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>
       indices.push_back(static_cast<int>(i));
     }
   }
-  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed, up);
+  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed, up, work);
   if (!other) return std::nullopt;
   for (int& i : other->inliers) i = indices[i];
   return other;

@@ -29,19 +29,22 @@ bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::
 // Same measurements and seed, same result.
 //
 // Up to so many poses, the best first: no two share more than nine tenths of the fewer inliers, and one
-// that has a quarter fewer inliers than the best may not be found.
+// that has a quarter fewer inliers than the best may not be found.  What is spent of `work` ends the search:
+// those that are found by then.
 std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
                                         const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt);
+                                        uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt,
+                                        WorkBudget* work = nullptr);
 // The best of them.  Nothing when no pose has at least 4 inliers.
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
-                                         uint64_t seed,
-                                         const std::optional<UpMeasurement>& up = std::nullopt);
+                                         uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt,
+                                         WorkBudget* work = nullptr);
 // The best of the measurements that are no inliers of a first.
 std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
                                               const RefineOptions& refine_options, uint64_t seed,
-                                              const std::optional<UpMeasurement>& up = std::nullopt);
+                                              const std::optional<UpMeasurement>& up = std::nullopt,
+                                              WorkBudget* work = nullptr);
 
 }  // namespace cairn

@@ -52,6 +52,7 @@ enum class NoFix {
   kAmbiguous,       // another pose is nearly as good
   kImprobable,      // most of what an image from there would show is missing
   kTilted,          // up is not where it was sensed
+  kOverBudget,      // what LocalizerOptions::budget_ms allows was done before a fix was sure
 };
 // Stable lower-case name ("too_few_matches"); "none" for kNone.
 const char* NoFixName(NoFix reason);
@@ -90,6 +91,7 @@ struct Localization {
   std::vector<Pose> possible_poses;
   std::vector<double> possible_probabilities;
 
+  double work_ms = 0;  // what the answer took: WorkBudget, not a clock
   int num_features = 0;
   int num_matches = 0;              // without knowing the pose
   int num_unguided_inliers = 0;     // of them

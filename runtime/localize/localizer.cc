@@ -10,6 +10,8 @@
 #include "core/base/no_throw.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/work/affordable_sift.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/accept.h"
 #include "runtime/localize/estimate.h"
 #include "runtime/localize/match.h"
@@ -37,6 +39,37 @@ Localization Failure(NoFix reason, std::string message) {
   localization.message = std::move(message);
   return localization;
 }
+
+// REQUIRES: it is spent
+Localization OverBudget(const WorkBudget& work, Localization found) {
+  Localization none = Failure(
+      NoFix::kOverBudget,
+      fmt::format("{:.3g} ms of work (budget_ms, times core_speed) are not enough: {}", work.total_ms(),
+                  found.num_features == 0  ? "the image's features alone take more"
+                  : found.num_matches == 0 ? "they were done before landmarks were matched"
+                                           : "they were done before a fix was sure"));
+  none.scope = found.scope;
+  none.num_features = found.num_features;
+  none.num_matches = found.num_matches;
+  none.num_unguided_inliers = found.num_unguided_inliers;
+  none.candidates = std::move(found.candidates);
+  none.work_ms = work.spent_ms();
+  return none;
+}
+
+// As many of these as may be, evenly.
+std::vector<LandmarkIdx> Thinned(std::vector<LandmarkIdx> landmarks, int64_t max_num) {
+  const int64_t num = std::ssize(landmarks);
+  if (num <= max_num) return landmarks;
+  for (int64_t i = 0; i < max_num; ++i) landmarks[i] = landmarks[i * num / max_num];
+  landmarks.resize(max_num);
+  return landmarks;
+}
+
+// Part of what is left for an answer that goes to its first poses at most; what follows makes it sure.
+constexpr double kEstimatePart = 0.5;
+// The same of each attempt after one that found something, where look-alikes of that may have to be excluded.
+constexpr double kMoreAttemptsPart = 0.5;
 
 // Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
 // not by different places.  Ascending by image and keypoint.
@@ -123,40 +156,61 @@ Status Localizer::CheckImage(const cv::Mat& grey, const Camera& camera) const {
                    camera.width, camera.height);
 }
 
-Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera) const {
-  CAIRN_RETURN_IF_ERROR(CheckImage(grey, camera));
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
-  return QueryFromFeatures(std::move(features), camera);
+std::shared_ptr<WorkBudget> Localizer::MakeBudget() const {
+  return std::make_shared<WorkBudget>(options_.budget_ms * options_.core_speed);
 }
 
-Result<Query> Localizer::CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work) const {
+  return QueryWithin(grey, camera, false, std::move(work));
+}
+
+Result<Query> Localizer::CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work) const {
+  return QueryWithin(grey, camera, true, std::move(work));
+}
+
+Result<Query> Localizer::QueryWithin(const cv::Mat& grey, const Camera& camera, bool coarse,
+                                     Budget work) const {
   CAIRN_RETURN_IF_ERROR(CheckImage(grey, camera));
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractUndoubledSift(grey, options_.sift, SiftScales::kCoarse));
-  CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(features), camera));
-  query.min_scale_px = CoarseSiftScalePx(grey.size(), options_.sift);
+  if (!work) work = MakeBudget();
+  const int64_t of_feature_ps =
+      WorkBudget::PicosecondsOf(Work::kRay) + WorkBudget::PicosecondsOf(Work::kWord);
+  CAIRN_ASSIGN_OR_RETURN(std::optional<AffordedSift> found,
+                         AffordableSift(grey, options_.sift, coarse, of_feature_ps, work.get()));
+  if (!found) {
+    work->GiveUp();
+    found.emplace();
+    found->features.descriptors.resize(0, kDescriptorDim);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(found->features), camera, work));
+  query.min_scale_px = found->min_scale_px;
   return query;
 }
 
 Status Localizer::AddFineFeatures(const cv::Mat& grey, int max_num,
                                   const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const {
   CAIRN_RETURN_IF_ERROR(CheckImage(grey, query->camera));
-  SiftOptions sift = options_.sift;
-  sift.max_num_features =
-      std::min(sift.max_num_features - static_cast<int>(query->features.keypoints.size()), max_num);
-  if (sift.max_num_features < 1) return Ok();
-  CAIRN_ASSIGN_OR_RETURN(const Features features,
-                         ExtractUndoubledSift(grey, sift, SiftScales::kFine, is_wanted));
+  const int num_known = static_cast<int>(query->features.keypoints.size());
+  WorkBudget* const work = query->work.get();
+  CAIRN_ASSIGN_OR_RETURN(
+      const Features features,
+      AffordableFineSift(grey, options_.sift, std::min(max_num, options_.sift.max_num_features - num_known),
+                         is_wanted, WorkBudget::PicosecondsOf(Work::kRay), work));
+  if (features.keypoints.empty() || !Spend(work, Work::kRay, features.keypoints.size())) return Ok();
   AddFeatures(features, options_.measurement, query);
   return Ok();
 }
 
-Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& camera) const {
+Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& camera, Budget work) const {
   CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
   if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
     return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
                      features.keypoints.size(), features.descriptors.rows());
   }
-  return MakeQuery(std::move(features), AsFound(map_->head(), camera), options_.measurement);
+  if (!work) work = MakeBudget();
+  Spend(work.get(), Work::kRay, features.keypoints.size());
+  Query query = MakeQuery(std::move(features), AsFound(map_->head(), camera), options_.measurement);
+  query.work = std::move(work);
+  return query;
 }
 
 Status Localizer::SetUp(const SensedUp& up, Query* query) const {
@@ -172,6 +226,7 @@ Status Localizer::SetUp(const SensedUp& up, Query* query) const {
 Result<Localization> Localizer::LocalizeQuery(const Sighting& query,
                                               const std::optional<PosePrior>& prior) const {
   const int num_features = query.num_features();
+  if (IsSpent(query.work)) return OverBudget(*query.work, Localization{.num_features = num_features});
   if (num_features < options_.accept.min_num_features) {
     Localization none = Failure(
         NoFix::kTooFewFeatures,
@@ -194,13 +249,27 @@ Result<Localization> Localizer::LocalizeBetter(const Sighting& sighting,
                                                const std::optional<PosePrior>& prior,
                                                Localization best) const {
   std::vector<ImageId> candidate_ids;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(sighting, prior, &candidate_ids));
+  WorkBudget* const work = sighting.work;
+  // What else may explain it leaves something for look-alikes of what does.
+  const auto part = [&] { return best.has_places() && MayHaveLookAlikes() ? kMoreAttemptsPart : 1; };
+  std::vector<Attempt> attempts;
+  {
+    const WorkBudget::Share share(work, part());
+    CAIRN_ASSIGN_OR_RETURN(attempts, MakeAttempts(sighting, prior, &candidate_ids));
+  }
   for (const Attempt& attempt : attempts) {
+    if (IsSpent(work)) break;
+    const WorkBudget::Share share(work, part());
     CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(sighting, attempt));
     best = BetterOf(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
-  CAIRN_ASSIGN_OR_RETURN(best, Answer(sighting, prior, std::move(best)));
+  if (IsSpent(work) && !best.has_places()) {
+    best.num_features = sighting.num_features();
+    best = OverBudget(*work, std::move(best));
+  } else {
+    CAIRN_ASSIGN_OR_RETURN(best, Answer(sighting, prior, std::move(best)));
+  }
   best.candidates = std::move(candidate_ids);
   return best;
 }
@@ -219,6 +288,8 @@ Result<Localization> Localizer::Answer(const Sighting& sighting, const std::opti
     CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(sighting, prior, std::move(localization)));
   }
   localization.num_features = sighting.num_features();
+  if (IsSpent(sighting.work)) return OverBudget(*sighting.work, std::move(localization));
+  if (sighting.work != nullptr) localization.work_ms = sighting.work->spent_ms();
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
   for (Pose& pose : localization.possible_poses) pose = given_from_camera * pose;
   if (localization.has_fix()) PutInGivenFrame(&localization);
@@ -237,24 +308,28 @@ void Localizer::PutInGivenFrame(Localization* fix) const {
 
 Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& landmarks,
                                         Localization fix) const {
+  WorkBudget* const work = query.work.get();
   fix.num_features = static_cast<int>(query.features.keypoints.size());
   const Pose first = map_->head().camera_from_given * fix.cam_from_world;
   const std::vector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
-  const auto refined =
-      RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first, options_.refine, query.up);
-  if (!refined || static_cast<int>(refined->inliers.size()) < fix.num_inliers ||
+  const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first,
+                                                options_.refine, query.up, query.work.get());
+  if (IsSpent(work) || !refined || static_cast<int>(refined->inliers.size()) < fix.num_inliers ||
       AreFarApart(refined->cam_from_world, first, options_.accept))
     return fix;
   const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
-  CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
+  CAIRN_ASSIGN_OR_RETURN(const double distance,
+                         DistanceFromSurvey(*map_, refined->cam_from_world.Center(), work));
   const Verdict verdict =
       JudgePose(*refined, inliers, query, distance, options_.accept, LengthUnit(map_->head().frame));
   if (verdict.reason != NoFix::kNone) return fix;
+  CAIRN_ASSIGN_OR_RETURN(const RegionIdx region, RegionWithMost(*map_, LandmarksOf(inliers), work));
+  if (IsSpent(work)) return fix;
+  fix.region = region;
   fix.cam_from_world = refined->cam_from_world;
   fix.covariance = refined->covariance;
   PutInGivenFrame(&fix);
   fix.num_inliers = static_cast<int>(inliers.size());
-  CAIRN_ASSIGN_OR_RETURN(fix.region, RegionWithMost(*map_, LandmarksOf(inliers)));
   return fix;
 }
 
@@ -268,14 +343,23 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
     return localization;
   };
 
+  WorkBudget* const work = sighting.work;
   std::shared_ptr<const LandmarkSet> landmarks;  // of all images
+  bool is_thinned = false;
+  if (!Spend(work, Work::kAttempt, 1)) return OverBudget(*work, std::move(localization));
   std::vector<Correspondence> matches;
   for (int image = 0; image < sighting.num_images(); ++image) {
     const std::vector<LandmarkIdx>& idx = attempt.landmarks[image];
     const bool is_known = image > 0 && idx == attempt.landmarks[image - 1];
-    if (!is_known) {
-      const bool all = static_cast<int64_t>(idx.size()) == map_->num_landmarks();
-      CAIRN_ASSIGN_OR_RETURN(landmarks, all ? map_->AllLandmarks() : map_->Gather(idx, true));
+    const bool all = static_cast<int64_t>(idx.size()) == map_->num_landmarks();
+    const int64_t max_num = MaxNumMatched(sighting.images[image]);
+    if (std::ssize(idx) > max_num && !attempt.may_be_thinned) work->GiveUp();
+    if (is_thinned || !is_known || std::ssize(idx) > max_num) {
+      is_thinned = is_thinned || std::ssize(idx) > max_num;
+      if (!Spend(work, Work::kLandmark, all ? 0 : std::min<int64_t>(std::ssize(idx), max_num)))
+        return OverBudget(*work, std::move(localization));
+      CAIRN_ASSIGN_OR_RETURN(
+          landmarks, all && !is_thinned ? map_->AllLandmarks() : map_->Gather(Thinned(idx, max_num), true));
     }
     for (Correspondence match : MatchLandmarks(sighting.images[image], *landmarks, options_.match)) {
       match.image = image;
@@ -284,10 +368,12 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   }
   const bool are_same = std::all_of(attempt.landmarks.begin(), attempt.landmarks.end(),
                                     [&](const auto& idx) { return idx == attempt.landmarks.front(); });
-  if (!are_same) {
+  if (!are_same || (is_thinned && sighting.num_images() > 1)) {
     CAIRN_ASSIGN_OR_RETURN(landmarks, map_->Gather(LandmarksOf(matches), false));
   }
   localization.num_matches = static_cast<int>(matches.size());
+  localization.num_features = sighting.num_features();
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   if (localization.num_matches < accept.min_num_matches) {
     return fail(NoFix::kTooFewMatches,
                 fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
@@ -296,12 +382,20 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   const std::vector<PoseMeasurement> measurements = MakeMeasurements(sighting, *landmarks, matches);
   const std::optional<UpMeasurement>& up = sighting.up;
   const char* with_gravity = up ? " with the sensed up" : "";
-  const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed, up);
+  std::optional<PoseEstimate> estimate;
+  bool was_cut = false;
+  {
+    const WorkBudget::Share share(work, kEstimatePart);
+    estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed, up, work);
+    was_cut = IsSpent(work);
+  }
+  if (!estimate && was_cut) return OverBudget(*work, std::move(localization));
   if (!estimate)
     return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose{}", matches.size(), with_gravity));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
   const double chance_of_inlier =
       ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, sighting);
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   const double log10_chance =
       Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier,
                        UsesTwoPoints(measurements, up, options_.estimate) ? 2 : 3);
@@ -316,14 +410,15 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   std::vector<PoseEstimate> firsts;
   if (localization.num_unguided_inliers < options_.sure_num_unguided_inliers) {
     for (PoseEstimate& first : EstimatePoses(measurements, options_.estimate.max_num_first_poses,
-                                             options_.estimate, options_.refine, kRansacSeed, up)) {
+                                             options_.estimate, options_.refine, kRansacSeed, up, work)) {
       if (static_cast<int>(first.inliers.size()) >= accept.min_num_unguided_inliers)
         firsts.push_back(std::move(first));
     }
   }
   // Of smaller errors, they may have fewer inliers than the one that was accepted.
   if (firsts.empty()) firsts.push_back(*estimate);
-  if (auto second = SecondPose(measurements, *estimate, up)) firsts.push_back(*std::move(second));
+  if (auto second = SecondPose(measurements, *estimate, up, work)) firsts.push_back(*std::move(second));
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   return Refine(sighting, *landmarks, matches, firsts, std::move(localization));
 }
 
@@ -336,6 +431,7 @@ Result<Localizer::FollowedUp> Localizer::FollowUp(const Sighting& sighting,
   if (options_.match.guided_num_images == 0) return own;
   CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
                          LandmarksToLookFor(sighting, own.found.matches, first.cam_from_world));
+  if (!Spend(sighting.work, Work::kLandmark, seen.size())) return own;
   CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(std::move(seen), false));
   GuidedMatches guided =
       MatchGuidedInRounds(sighting, *covisible, first, options_.match, options_.estimate, options_.refine);
@@ -354,6 +450,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
                                        const std::vector<Correspondence>& matches,
                                        const std::vector<PoseEstimate>& firsts,
                                        Localization localization) const {
+  WorkBudget* const work = sighting.work;
   const auto fail = [&](NoFix reason, std::string message) {
     localization.reason = reason;
     localization.message = std::move(message);
@@ -364,6 +461,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
   size_t most = 0;
   for (const PoseEstimate& first : firsts) {
     CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(sighting, matches, first));
+    if (IsSpent(work)) return OverBudget(*work, std::move(localization));
     followed_up.push_back(std::move(next));
     if (followed_up.back().found.matches.size() > followed_up[most].found.matches.size())
       most = followed_up.size() - 1;
@@ -384,6 +482,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
     if (!is_weak && static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(sighting, matched, best));
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(sighting, matched, other));
+      if (IsSpent(work)) return OverBudget(*work, std::move(localization));
       return Ambiguous(std::move(localization), {best.found.cam_from_world, other.found.cam_from_world},
                        {OddsOfPlace(here), OddsOfPlace(there)}, odds_elsewhere,
                        fmt::format("{} and {} matches agree on poses at different places",
@@ -403,6 +502,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
     }
   }
   CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(sighting, matched, best));
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   localization.probability = ProbabilityAmong(OddsOfPlace(evidence), odds_elsewhere);
   if (localization.probability < options_.accept.min_probability) {
     return fail(
@@ -413,8 +513,10 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
                     evidence.num_expected, evidence.num_cells_expected, evidence.num_matched,
                     evidence.num_cells_found, localization.probability, options_.accept.min_probability));
   }
-  const auto refined = RefinePoseWithCovariance(MakeMeasurements(sighting, landmarks, best.found.matches),
-                                                best.found.cam_from_world, options_.refine, sighting.up);
+  const auto refined =
+      RefinePoseWithCovariance(MakeMeasurements(sighting, landmarks, best.found.matches),
+                               best.found.cam_from_world, options_.refine, sighting.up, work);
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   if (!refined) {
     return fail(NoFix::kUncertain,
                 fmt::format("{} inliers do not determine the pose", best.found.matches.size()));
@@ -429,20 +531,22 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
             "of {} matches that agree on a pose {} are left after refinement; at least {:.0f} % are needed",
             localization.num_unguided_inliers, localization.num_inliers, 100 * min_kept_ratio));
   }
-  CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
+  CAIRN_ASSIGN_OR_RETURN(const double distance,
+                         DistanceFromSurvey(*map_, refined->cam_from_world.Center(), work));
   Verdict verdict =
       JudgePose(*refined, inliers, sighting, distance, options_.accept, LengthUnit(map_->head().frame));
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
   localization.reason = NoFix::kNone;
   localization.cam_from_world = refined->cam_from_world;
   localization.covariance = refined->covariance;
-  CAIRN_ASSIGN_OR_RETURN(localization.region, RegionWithMost(*map_, LandmarksOf(inliers)));
+  CAIRN_ASSIGN_OR_RETURN(localization.region, RegionWithMost(*map_, LandmarksOf(inliers), work));
   return localization;
 }
 
 std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurement>& measurements,
                                                   const PoseEstimate& first,
-                                                  const std::optional<UpMeasurement>& up) const {
+                                                  const std::optional<UpMeasurement>& up,
+                                                  WorkBudget* work) const {
   const AcceptOptions& accept = options_.accept;
   if (accept.max_second_pose_ratio <= 0) return std::nullopt;
   // What it leads to tells more than what it begins with.
@@ -454,7 +558,8 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
   estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
   estimate_options.min_num_ransac_iterations =
       std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
-  auto second = EstimateOtherPose(measurements, first, estimate_options, options_.refine, kRansacSeed, up);
+  auto second =
+      EstimateOtherPose(measurements, first, estimate_options, options_.refine, kRansacSeed, up, work);
   if (!second || static_cast<double>(second->inliers.size()) < needed ||
       !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
     return std::nullopt;
@@ -470,8 +575,8 @@ void QueryFrame::set_up(const SensedUp& up) {
 
 Result<const Query*> QueryFrame::WithAllFeatures() {
   if (!query_) {
-    CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_)
-                                              : localizer_.QueryFromFeatures(features_, camera_));
+    CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, work_)
+                                              : localizer_.QueryFromFeatures(features_, camera_, work_));
     if (up_) CAIRN_RETURN_IF_ERROR(localizer_.SetUp(*up_, &query));
     query_ = std::make_shared<const Query>(std::move(query));
   }

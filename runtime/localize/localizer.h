@@ -27,6 +27,7 @@ struct PoseMeasurement;
 struct PoseEstimate;
 struct PlaceEvidence;
 struct LandmarkSet;  // runtime/map/landmark_set.h
+class WorkBudget;    // core/work/work_budget.h
 
 // An image that a camera of a rig takes at the same time as the others take theirs.
 struct RigImage {
@@ -73,12 +74,16 @@ class Localizer {
 
   // The steps of Localize, for callers that know more than one image (RegionTracker).  The features of an
   // image, with their rays and packed descriptors.  Errors: as Localize.
-  Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
-  Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
+  // `work`: what is left for its answer; null: LocalizerOptions::budget_ms.  Where that is not enough for all
+  // features of the image they are those that it is enough for (core/work/affordable_sift.h), or none.
+  using Budget = std::shared_ptr<WorkBudget>;
+  Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work = nullptr) const;
+  Result<Query> QueryFromFeatures(Features features, const Camera& camera, Budget work = nullptr) const;
   // In two steps, a third of the time: its coarse features (SiftScales), then of its fine ones those that are
   // wanted.
-  Result<Query> CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera) const;
-  // At most so many, the strongest, and no more than SiftOptions::max_num_features with those that it has.
+  Result<Query> CoarseQueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work = nullptr) const;
+  // At most so many, the strongest, and no more than SiftOptions::max_num_features with those that it has;
+  // none where there is no work left for them.
   // Errors: as Localize.
   Status AddFineFeatures(const cv::Mat& grey, int max_num,
                          const std::function<bool(const Keypoint&)>& is_wanted, Query* query) const;
@@ -97,12 +102,16 @@ class Localizer {
   Result<Localization> Sharpen(const Query& query, const LandmarkSet& landmarks, Localization fix) const;
 
   const LocalizerOptions& options() const { return options_; }
+  // For an answer to one image, or to one frame.
+  Budget MakeBudget() const;
 
  private:
+  Result<Query> QueryWithin(const cv::Mat& grey, const Camera& camera, bool coarse, Budget work) const;
   // Landmarks to match.
   struct Attempt {
     Scope scope = Scope::kAll;
     std::vector<std::vector<LandmarkIdx>> landmarks;  // with each image, ascending
+    bool may_be_thinned = true;                       // where there is no work left for all of them
     size_t num_landmarks() const;                     // with all of them together
   };
   struct FollowedUp;
@@ -145,13 +154,16 @@ class Localizer {
   // it.
   Result<std::vector<PlaceToTry>> WithLookAlikes(const Sighting& sighting, const std::vector<Pose>& poses,
                                                  const std::optional<PosePrior>& prior) const;
+  bool MayHaveLookAlikes() const;
   // `best`, a fix or one of several places, unless look-alikes of these explain the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                          Localization best) const;
   // A pose at another place that max_second_pose_ratio as many other matches agree on.
   std::optional<PoseEstimate> SecondPose(const std::vector<PoseMeasurement>& measurements,
-                                         const PoseEstimate& first,
-                                         const std::optional<UpMeasurement>& up) const;
+                                         const PoseEstimate& first, const std::optional<UpMeasurement>& up,
+                                         WorkBudget* work) const;
+  // How many landmarks an image may be matched with.
+  int64_t MaxNumMatched(const Query& query) const;
 
   std::shared_ptr<const Map> map_;
   LocalizerOptions options_;
@@ -162,9 +174,12 @@ class Localizer {
 class QueryFrame {
  public:
   QueryFrame(const Localizer& localizer, const cv::Mat& grey, const Camera& camera)
-      : localizer_(localizer), grey_(grey), camera_(camera) {}
+      : localizer_(localizer), grey_(grey), camera_(camera), work_(localizer.MakeBudget()) {}
   QueryFrame(const Localizer& localizer, Features features, const Camera& camera)
-      : localizer_(localizer), features_(std::move(features)), camera_(camera) {}
+      : localizer_(localizer),
+        features_(std::move(features)),
+        camera_(camera),
+        work_(localizer.MakeBudget()) {}
 
   // Which way was up, of features that are known by now, too.  REQUIRES: CheckSensedUp
   void set_up(const SensedUp& up);
@@ -178,6 +193,8 @@ class QueryFrame {
   // The image, as long as not all of its features are known; null after that, and where there is none.
   const cv::Mat* image() const { return grey_ && !query_ ? &*grey_ : nullptr; }
   const Camera& camera() const { return camera_; }
+  // What its answer may cost.
+  const Localizer::Budget& work() const { return work_; }
   // Errors: as Localizer::QueryFromImage, QueryFromFeatures.
   Result<const Query*> WithAllFeatures();
 
@@ -188,6 +205,7 @@ class QueryFrame {
   Camera camera_;
   std::optional<SensedUp> up_;
   ReadoutAt readout_;
+  Localizer::Budget work_;
   std::shared_ptr<const Query> query_;  // with all features
 };
 

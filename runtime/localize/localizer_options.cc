@@ -28,6 +28,17 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
        .help = "where up is sensed: how well the map knows which way is up from its floor, degrees",
        .min = 0.01,
        .max = 90});
+  table.push_back(
+      {.name = "budget_ms",
+       .value = &options->budget_ms,
+       .help = "most work for an answer, ms of a core as fast as core_speed says; counted, not timed; 0: any",
+       .min = 0});
+  table.push_back({.name = "core_speed",
+                   .value = &options->core_speed,
+                   .help = "how fast a core is, beside the one on which work was measured (AMD Zen 5)",
+                   .min = 1e-3,
+                   .max = 1e3});
+  AddCondition({"budget_ms", {"not 0"}}, {"core_speed"}, &table);
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});

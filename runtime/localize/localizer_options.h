@@ -184,6 +184,13 @@ struct LocalizerOptions {
   // How well the map's up is known, degrees per axis: that of its floor, against which a sensed up is held.
   // REQUIRES: > 0
   double floor_up_sigma_deg = 2;
+  // Most work for an answer, milliseconds of a core that is core_speed times as fast as the one on which work
+  // was measured (core/work/work_budget.h); 0: any.  Where it is less than all features of an image take,
+  // fewer are sought, and fewer landmarks; what makes a fix sure is never left out: where there is no room
+  // for it, there is none (NoFix::kOverBudget).  Work is counted and not timed: the same image, the same
+  // answer. Reading the map's parts from the disk is not counted.  REQUIRES: >= 0, > 0
+  double budget_ms = 0;
+  double core_speed = 1;
   // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
   bool fall_back_to_all = true;
   int fall_back_max_num_landmarks = 200000;

@@ -38,9 +38,9 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
   const auto add = [&](const Pose& pose) -> Status {
     PlaceToTry place{pose, {}};
     for (const Query& query : sighting.images) {
-      CAIRN_ASSIGN_OR_RETURN(
-          auto near,
-          RetrieveByPrior(*map_, PriorOfImage({given_from_camera * pose, 0, 0}, query), options_.retrieve));
+      CAIRN_ASSIGN_OR_RETURN(auto near,
+                             RetrieveByPrior(*map_, PriorOfImage({given_from_camera * pose, 0, 0}, query),
+                                             options_.retrieve, sighting.work));
       place.near.push_back(std::move(near));
     }
     places.push_back(std::move(place));
@@ -64,7 +64,7 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
       RetrieveOptions retrieve = options_.retrieve;
       retrieve.max_num_candidates = std::numeric_limits<int>::max();
       CAIRN_ASSIGN_OR_RETURN(const auto candidates,
-                             RetrieveByPrior(*map_, PriorOfImage(*prior, query), retrieve));
+                             RetrieveByPrior(*map_, PriorOfImage(*prior, query), retrieve, sighting.work));
       possible = ImagesOf(candidates);
       std::sort(possible.begin(), possible.end());
     }
@@ -106,10 +106,14 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
   return places;
 }
 
+bool Localizer::MayHaveLookAlikes() const {
+  return options_.exclude_look_alikes && map_->directory().NumBlocks(BlockKind::kAmbiguity) > 0;
+}
+
 Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
                                                   const std::optional<PosePrior>& prior,
                                                   Localization best) const {
-  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
+  if (!MayHaveLookAlikes()) return best;
   const std::vector<Pose> poses =
       best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(sighting, poses, prior));
@@ -119,9 +123,11 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
   std::vector<Localization> found;
   bool is_confirmed = true;
   for (size_t i = 0; i < places.size(); ++i) {
-    Attempt attempt{.scope = Scope::kImages};
+    // Or numbers of matches do not compare.
+    Attempt attempt{.scope = Scope::kImages, .may_be_thinned = false};
     for (const std::vector<Candidate>& near : places[i].near) {
-      CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(near)));
+      CAIRN_ASSIGN_OR_RETURN(auto landmarks,
+                             LandmarksOfImages(*map_, ImagesOf(near), kAnyNum, sighting.work));
       attempt.landmarks.push_back(std::move(landmarks));
     }
     Localization here;

@@ -9,6 +9,7 @@
 #include "core/camera/pixel_ray.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/refine.h"
 #include "runtime/map/landmark_set.h"
 
@@ -110,6 +111,7 @@ class GuidedSearch {
         grid_(query, std::max(8.0, options.guided_radius_px)) {
     const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
     const double focal_px = query.camera.MeanFocal();
+    if (!Spend(query.work.get(), Work::kProject, landmarks.idx.size())) return;
     projected_.reserve(landmarks.idx.size());
     for (size_t k = 0; k < landmarks.idx.size(); ++k) {
       const MapLandmark& landmark = landmarks.landmarks[k];
@@ -138,13 +140,16 @@ class GuidedSearch {
       if (!IsInImage(pixel, query_.camera)) continue;
       const uint8_t* descriptor = landmarks_.descriptors.row(static_cast<Eigen::Index>(at.k)).data();
       std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
+      size_t num_near = 1;
       grid_.VisitNear(pixel, at.radius_px, [&](KeypointIdx i) {
+        ++num_near;
         if (!ScaleFits(query_.features.keypoints[i], landmarks_.landmarks[at.k], at.depth, focal_px,
                        options_.guided_max_scale_ratio))
           return;
         const int32_t dot = DescriptorDot(query_.features.descriptors.row(i).data(), descriptor);
         if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
       });
+      if (!Spend(query_.work.get(), Work::kNear, num_near)) break;
       if (best.second < 0 || best.first < min_dot) continue;
       Best& known = best_of_keypoint[best.second];
       if (known.dot < 0) ++num_found;
@@ -223,6 +228,8 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
                                            const MatchOptions& options) {
   const DescriptorMatcherOptions matcher_options{
       .max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad, .mutual = true};
+  if (!Spend(query.work.get(), Work::kDescriptorPair, query.features.keypoints.size() * landmarks.idx.size()))
+    return {};
   std::vector<Correspondence> correspondences;
   for (const Match& match : MatchDescriptors(query.packed, landmarks.packed, matcher_options)) {
     if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks.idx[match.idx2]});
@@ -231,7 +238,8 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
 }
 
 Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                                    const MatchOptions& options) {
+                                                    const MatchOptions& options, int64_t max_num,
+                                                    WorkBudget* work) {
   std::vector<int32_t> image_blocks;  // those that a landmark's block names
   int64_t ordinal = -1;
   for (const LandmarkIdx landmark : seen) {
@@ -246,6 +254,7 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
   for (const int32_t image_block : image_blocks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));
     for (size_t i = 0; i < block->images.size(); ++i) {
+      if (!Spend(work, Work::kListed, block->images[i].landmarks.size() + seen.size())) return seen;
       const int num_shared = NumShared(block->images[i].landmarks, seen);
       if (num_shared > 0) order.emplace_back(-num_shared, block->first + static_cast<int32_t>(i));
     }
@@ -254,6 +263,7 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
   std::vector<LandmarkIdx> landmarks = seen;
   for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
+    if (i > 0 && static_cast<int64_t>(landmarks.size() + image->landmarks.size()) > max_num) break;
     landmarks.insert(landmarks.end(), image->landmarks.begin(), image->landmarks.end());
   }
   SortUnique(&landmarks);
@@ -286,7 +296,7 @@ GuidedMatches MatchGuidedInRounds(const Sighting& sighting, const LandmarkSet& l
     wide.guided_radius_px *= wider;
     const auto estimate =
         EstimatePose(MakeMeasurements(sighting, landmarks, MatchGuided(sighting, landmarks, pose, wide)),
-                     estimate_options, refine_options, kRansacSeed, sighting.up);
+                     estimate_options, refine_options, kRansacSeed, sighting.up, sighting.work);
     if (!estimate) break;
     pose = estimate->cam_from_world;
     std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, pose, options);
@@ -294,7 +304,7 @@ GuidedMatches MatchGuidedInRounds(const Sighting& sighting, const LandmarkSet& l
   }
   for (int round = 1; round < options.guided_max_num_rounds; ++round) {
     const auto refined = RefinePose(MakeMeasurements(sighting, landmarks, best.matches), best.cam_from_world,
-                                    refine_options, sighting.up);
+                                    refine_options, sighting.up, sighting.work);
     if (!refined) break;
     std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, *refined, options);
     if (matches.size() <= best.matches.size()) break;

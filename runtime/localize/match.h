@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/geometry/pose.h"
@@ -17,9 +19,12 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
                                            const MatchOptions& options);
 
 // Landmarks that should be visible given these (ascending): those seen in the survey images that share most
-// of them, ascending.  Errors: as Map::Landmarks.
+// of them, ascending; of so many of these images that they are no more than max_num, or of one.  Errors: as
+// Map::Landmarks.
 Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                                    const MatchOptions& options);
+                                                    const MatchOptions& options,
+                                                    int64_t max_num = std::numeric_limits<int64_t>::max(),
+                                                    WorkBudget* work = nullptr);
 
 // Correspondences of landmarks with keypoints near their projections at a pose: per landmark and image the
 // keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by image, then

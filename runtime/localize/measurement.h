@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,7 @@
 
 namespace cairn {
 
+class WorkBudget;    // core/work/work_budget.h
 struct LandmarkSet;  // runtime/map/landmark_set.h
 struct MapLandmark;  // core/packing/map_landmark.h
 
@@ -59,8 +61,9 @@ struct Query {
   double min_scale_px = 0;
   // These in frames of the map's cameras (MapHead::camera_from_given).
   std::optional<UpMeasurement> up;
-  Pose cam_from_rig;      // of a camera of a rig, whose frame `up` is in then
-  ReadoutMotion readout;  // poses are those of the middle row
+  Pose cam_from_rig;                 // of a camera of a rig, whose frame `up` is in then
+  ReadoutMotion readout;             // poses are those of the middle row
+  std::shared_ptr<WorkBudget> work;  // what its answer may cost; null: not counted
 };
 
 // Where a point of the camera's frame in the middle row's moment is seen, in the image or not; as
@@ -80,10 +83,13 @@ bool WasLookedFor(const MapLandmark& landmark, double depth_m, const Query& quer
 struct Sighting {
   std::span<const Query> images;
   std::optional<UpMeasurement> up;
+  WorkBudget* work;  // null: not counted
 
-  Sighting(const Query& query) : images(&query, 1), up(query.up) {}  // NOLINT: an image is a sighting
-  // REQUIRES: at least one; what the first knows of up counts
-  explicit Sighting(std::span<const Query> of_rig) : images(of_rig), up(of_rig.front().up) {}
+  Sighting(const Query& query)
+      : images(&query, 1), up(query.up), work(query.work.get()) {}  // NOLINT: an image is a sighting
+  // REQUIRES: at least one; what the first knows of up, and its budget, count
+  explicit Sighting(std::span<const Query> of_rig)
+      : images(of_rig), up(of_rig.front().up), work(of_rig.front().work.get()) {}
   int num_images() const { return static_cast<int>(images.size()); }
   int num_features() const;
 };

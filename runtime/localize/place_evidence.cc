@@ -10,6 +10,7 @@
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "core/promise/view_distance.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
 
@@ -42,6 +43,8 @@ Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const 
     images.push_back(image);
   }
   SortUnique(&idx);
+  WorkBudget* const work = query.work.get();
+  if (!Spend(work, Work::kLandmark, idx.size()) || !Spend(work, Work::kProject, idx.size())) return evidence;
   std::vector<double> weights(idx.size(), 0);  // sums over the images that see it
   for (size_t i = 0; i < images.size(); ++i) {
     size_t k = 0;
@@ -93,7 +96,7 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, 
     const Pose cam_from_world = query.cam_from_rig * rig_from_world;
     CAIRN_ASSIGN_OR_RETURN(
         const std::vector<NearView> near,
-        NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews));
+        NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews, query.work.get()));
     std::sort(found_idx[i].begin(), found_idx[i].end());
     CAIRN_ASSIGN_OR_RETURN(PlaceEvidence of_image,
                            EvidenceOfImage(map, query, cam_from_world, near, found_idx[i], num_cells));

@@ -12,6 +12,7 @@
 
 #include "core/base/quantiles.h"
 #include "core/geometry/vector_geometry.h"
+#include "core/work/work_budget.h"
 
 namespace cairn {
 namespace {
@@ -152,10 +153,12 @@ double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEqua
 }
 
 std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measurements, Pose pose,
-                                       double scale, int max_num_iterations, const WeightedUp& up) {
+                                       double scale, int max_num_iterations, const WeightedUp& up,
+                                       WorkBudget* work) {
   double damping = 1e-6;
   NormalEquations equations;
-  for (int iteration = 0; iteration < max_num_iterations; ++iteration) {
+  for (int iteration = 0; iteration < max_num_iterations && Spend(work, Work::kRefine, measurements.size());
+       ++iteration) {
     equations = BuildNormalEquations(measurements, pose, scale, up, std::move(equations.informations));
     if (equations.num_points < 3) return std::nullopt;
     bool improved = false;
@@ -301,9 +304,10 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to) {
 }
 
 std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
-                               const RefineOptions& options, const std::optional<UpMeasurement>& up) {
+                               const RefineOptions& options, const std::optional<UpMeasurement>& up,
+                               WorkBudget* work) {
   return LevenbergMarquardt(measurements, initial, options.robust_scale, options.max_num_refine_iterations,
-                            {up});
+                            {up}, work);
 }
 
 double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world) {
@@ -312,10 +316,11 @@ double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world) {
 
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
                                                     const Pose& initial, const RefineOptions& options,
-                                                    const std::optional<UpMeasurement>& up) {
+                                                    const std::optional<UpMeasurement>& up,
+                                                    WorkBudget* work) {
   constexpr int kMinNumInliers = 5;  // 10 residuals for 6 parameters
   if (static_cast<int>(measurements.size()) < kMinNumInliers) return std::nullopt;
-  std::optional<Pose> pose = RefinePose(measurements, initial, options, up);
+  std::optional<Pose> pose = RefinePose(measurements, initial, options, up, work);
   if (!pose) return std::nullopt;
   RefinedPose refined;
   const double truncation = TruncationFactor(options.inlier_chi_square);
@@ -328,7 +333,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   // The loss's scale is in units of the noise, which is known only now.
   refined.noise_variance = VarianceFromMedian(squares);
   pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
-                            options.max_num_refine_iterations, {up, variance_unit(measurements)});
+                            options.max_num_refine_iterations, {up, variance_unit(measurements)}, work);
   if (!pose) return std::nullopt;
   squares = WhitenedSquares(measurements, *pose);
   refined.noise_variance = VarianceFromMedian(squares);
@@ -344,7 +349,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     refined.inliers = std::move(inliers);
     const std::vector<PoseMeasurement> used = Select(measurements, refined.inliers);
     pose = LevenbergMarquardt(used, *pose, std::numeric_limits<double>::infinity(),
-                              options.max_num_refine_iterations, {up, variance_unit(used)});
+                              options.max_num_refine_iterations, {up, variance_unit(used)}, work);
     if (!pose) return std::nullopt;
     squares = WhitenedSquares(measurements, *pose);
     double sum = 0;

@@ -24,7 +24,8 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to);
 // front of their camera or the normal equations are singular.
 std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
                                const RefineOptions& options,
-                               const std::optional<UpMeasurement>& up = std::nullopt);
+                               const std::optional<UpMeasurement>& up = std::nullopt,
+                               WorkBudget* work = nullptr);
 
 // How far up is, where a pose has it, from where it was sensed, standard deviations.
 double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world);
@@ -45,7 +46,8 @@ struct RefinedPose {
 // Nothing when fewer than 5 inliers are left or the geometry is degenerate.
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
                                                     const Pose& initial, const RefineOptions& options,
-                                                    const std::optional<UpMeasurement>& up = std::nullopt);
+                                                    const std::optional<UpMeasurement>& up = std::nullopt,
+                                                    WorkBudget* work = nullptr);
 
 // Of a covariance's worst direction.
 double LargestSigma(const Eigen::Matrix3d& covariance);

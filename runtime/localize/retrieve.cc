@@ -13,6 +13,7 @@
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/vocabulary/vocabulary_tree.h"
+#include "core/work/work_budget.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
 
@@ -76,8 +77,9 @@ Result<Documents> DocumentsOf(const Map& map) {
   return documents;
 }
 
-Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const DescriptorMatrix& descriptors,
+Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query& query,
                                                     const RetrieveOptions& options) {
+  const DescriptorMatrix& descriptors = query.features.descriptors;
   CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
   CAIRN_ASSIGN_OR_RETURN(const auto norms, map.DocumentNorms());
   std::vector<WordIdx> words(descriptors.rows());
@@ -90,6 +92,7 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Descri
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
   std::vector<double> dots(map.num_images(), 0.0);
   double squared_norm = 0;
+  size_t num_postings = map.num_images();
   std::shared_ptr<const WordBlock> block;
   for (size_t begin = 0, end = 0; begin < words.size(); begin = end) {
     const WordIdx word = words[begin];
@@ -99,12 +102,14 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Descri
     }
     const std::vector<Posting>& postings = block->postings[word - block->first];
     if (postings.empty()) continue;
+    num_postings += postings.size();
     // [Mariottini11 §IV] the query vector's entry, a word's count times its inverse document frequency
     const double idf = std::log(documents.count / static_cast<double>(postings.size()));
     const double query_weight = static_cast<double>(end - begin) * idf;
     squared_norm += query_weight * query_weight;
     for (const Posting& posting : postings) dots[posting.document] += query_weight * idf * posting.count;
   }
+  if (!Spend(query.work.get(), Work::kPosting, num_postings)) return std::vector<Candidate>();
   return BestImages(
       dots, std::sqrt(squared_norm), [&](size_t image) { return (*norms)[image]; }, options);
 }
@@ -194,12 +199,17 @@ std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
 
 Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
                                                const RetrieveOptions& options) {
-  return map.has_words() ? RetrieveByVocabulary(map, query.features.descriptors, options)
+  const size_t num_features = query.features.keypoints.size();
+  const bool may = map.has_words() ? Spend(query.work.get(), Work::kWord, num_features)
+                                   : Spend(query.work.get(), Work::kDescriptorPair,
+                                           num_features * static_cast<size_t>(map.num_landmarks()));
+  if (!may) return std::vector<Candidate>();
+  return map.has_words() ? RetrieveByVocabulary(map, query, options)
                          : RetrieveByLandmarks(map, query, options);
 }
 
 Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
-                                               const RetrieveOptions& options) {
+                                               const RetrieveOptions& options, WorkBudget* work) {
   const Pose cam_from_world = map.head().camera_from_given * prior.cam_from_world;
   const double max_distance = options.prior_distance_m + 3 * prior.sigma_m;
   const double max_angle = options.prior_angle_deg + 3 * prior.sigma_deg;
@@ -209,6 +219,7 @@ Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& 
         max_distance)
       continue;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
+    if (!Spend(work, Work::kImage, block->images.size())) break;
     for (size_t i = 0; i < block->images.size(); ++i) {
       const Pose& survey = block->images[i].cam_from_world;
       const double distance = CenterErrorM(survey, cam_from_world);
@@ -225,7 +236,7 @@ Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& 
 }
 
 Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
-                                           double radius_deg, int max_num) {
+                                           double radius_deg, int max_num, WorkBudget* work) {
   const Eigen::Vector3d center = cam_from_world.Center();
   std::vector<NearView> nearest;  // ascending
   nearest.reserve(max_num + 1);
@@ -236,6 +247,7 @@ Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_
     const bool is_full = static_cast<int>(nearest.size()) == max_num;
     if (is_full && std::pow(least / radius_m, 2) > nearest.back().squared_distance) break;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
+    if (!Spend(work, Work::kImage, block->images.size())) break;
     for (size_t i = 0; i < block->images.size(); ++i) {
       const Pose& survey = block->images[i].cam_from_world;
       const NearView view{block->first + static_cast<int32_t>(i),
@@ -278,19 +290,21 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
   return regions;
 }
 
-Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks,
+                                                 WorkBudget* work) {
   std::vector<LandmarkIdx> ascending = landmarks;
   std::sort(ascending.begin(), ascending.end());
   std::vector<RegionVotes> votes;
-  int64_t ordinal = -1;
-  for (const LandmarkIdx landmark : ascending) {
-    const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
-    if (next == ordinal) continue;
-    ordinal = next;
-    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+  std::vector<LandmarkIdx> of_block;
+  for (auto first = ascending.begin(), end = first; first != ascending.end(); first = end) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block,
+                           map.Landmarks(map.directory().OrdinalOf(BlockKind::kLandmarks, *first)));
+    end = std::lower_bound(first, ascending.end(), block->first + std::ssize(block->landmarks));
+    of_block.assign(first, end);
     // [Sala06 §III] a vote for each region that it belongs to
     for (const auto& [region, of_region] : block->regions) {
-      const int num_shared = NumShared(of_region, ascending);
+      if (!Spend(work, Work::kListed, of_region.size() + of_block.size())) return std::vector<RegionVotes>();
+      const int num_shared = NumShared(of_region, of_block);
       if (num_shared > 0) votes.push_back({region, num_shared});
     }
   }
@@ -311,14 +325,17 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
   return votes;
 }
 
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, landmarks));
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks,
+                                 WorkBudget* work) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, landmarks, work));
   return votes.empty() ? -1 : votes.front().region;
 }
 
-Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions) {
+Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions,
+                                                    int64_t max_num, WorkBudget* work) {
   std::vector<LandmarkIdx> landmarks;
   for (const RegionIdx region : regions) {
+    const size_t num_before = landmarks.size();
     CAIRN_ASSIGN_OR_RETURN(const auto of_regions,
                            map.Regions(map.directory().OrdinalOf(BlockKind::kRegions, region)));
     for (const int32_t ordinal : of_regions->landmark_blocks[region - of_regions->first]) {
@@ -327,28 +344,37 @@ Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::v
           std::lower_bound(block->regions.begin(), block->regions.end(), region,
                            [](const auto& list, RegionIdx value) { return list.first < value; });
       if (found == block->regions.end() || found->first != region) continue;
+      if (!Spend(work, Work::kListed, found->second.size())) return std::vector<LandmarkIdx>();
       landmarks.insert(landmarks.end(), found->second.begin(), found->second.end());
+    }
+    if (num_before > 0 && std::ssize(landmarks) > max_num) {
+      landmarks.resize(num_before);
+      break;
     }
   }
   SortUnique(&landmarks);
   return landmarks;
 }
 
-Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images) {
+Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images,
+                                                   int64_t max_num, WorkBudget* work) {
   std::vector<LandmarkIdx> landmarks;
   for (const int32_t image : images) {
     CAIRN_ASSIGN_OR_RETURN(const auto row, map.Image(image));
+    if (!landmarks.empty() && std::ssize(landmarks) + std::ssize(row->landmarks) > max_num) break;
+    if (!Spend(work, Work::kListed, row->landmarks.size())) return std::vector<LandmarkIdx>();
     landmarks.insert(landmarks.end(), row->landmarks.begin(), row->landmarks.end());
   }
   SortUnique(&landmarks);
   return landmarks;
 }
 
-Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center) {
+Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center, WorkBudget* work) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const auto& [least, ordinal] : ImageBlocksByDistance(map, center)) {
     if (least >= nearest) break;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
+    if (!Spend(work, Work::kImage, block->images.size())) break;
     for (const MapImage& image : block->images) {
       nearest = std::min(nearest, (image.cam_from_world.Center() - center).norm());
     }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "runtime/localize/localization.h"
@@ -16,7 +18,8 @@ struct Candidate {
 };
 std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates);
 
-// All of these: errors as Map::Landmarks, a damaged block.
+// All of these: errors as Map::Landmarks, a damaged block.  `work`: counts what they take; null: nothing
+// does.
 
 // Survey images most like the query [Mariottini11 §IV], best first: by the vocabulary's words, or, in
 // a map without one, by the landmarks nearest to the query's descriptors, each a word of its own.
@@ -24,7 +27,7 @@ Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& quer
                                                const RetrieveOptions& options);
 // Survey images taken near the prior (in the map's own frame), nearest first; score 1 / (1 + distance in m).
 Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
-                                               const RetrieveOptions& options);
+                                               const RetrieveOptions& options, WorkBudget* work = nullptr);
 
 // A survey image near a pose.
 struct NearView {
@@ -34,7 +37,7 @@ struct NearView {
 // The survey images nearest to a pose of the map's own frame, nearest first, at most so many.
 // REQUIRES: radius_m, radius_deg > 0, max_num >= 1
 Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
-                                           double radius_deg, int max_num);
+                                           double radius_deg, int max_num, WorkBudget* work = nullptr);
 
 // The survey image nearest to a fix or, where it is ambiguous, to the best of its poses.
 // REQUIRES: it has a pose; the map has images
@@ -50,17 +53,23 @@ struct RegionVotes {
   RegionIdx region = -1;
   int num_votes = 0;
 };
-Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks,
+                                                 WorkBudget* work = nullptr);
 
 // The region that has most of these landmarks, the smaller index on a tie; -1 for none.
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks,
+                                 WorkBudget* work = nullptr);
 
-// Landmarks of regions, of images, ascending, each once.
-Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
-Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);
+// Landmarks of regions, of images, ascending, each once; of the first of them that have no more than max_num
+// together, or of the first one.
+constexpr int64_t kAnyNum = std::numeric_limits<int64_t>::max();
+Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions,
+                                                    int64_t max_num = kAnyNum, WorkBudget* work = nullptr);
+Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images,
+                                                   int64_t max_num = kAnyNum, WorkBudget* work = nullptr);
 
 // Distance from a place (in the map's own frame) to the nearest survey camera, metres; infinite
 // without images.
-Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center);
+Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center, WorkBudget* work = nullptr);
 
 }  // namespace cairn

@@ -273,6 +273,7 @@ void BindLocalizer(py::module_& module) {
       .def_readonly("probability", &Localization::probability)
       .def_readonly("region", &Localization::region)
       .def_property_readonly("scope", [](const Localization& self) { return ScopeName(self.scope); })
+      .def_readonly("work_ms", &Localization::work_ms)
       .def_readonly("num_features", &Localization::num_features)
       .def_readonly("num_matches", &Localization::num_matches)
       .def_readonly("num_inliers", &Localization::num_inliers)

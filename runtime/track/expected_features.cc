@@ -6,6 +6,7 @@
 
 #include "core/blocks/map_rows.h"
 #include "core/camera/pixel_ray.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
 #include "runtime/map/landmark_set.h"
@@ -89,6 +90,8 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
 Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const QueryFrame& frame,
                                       const std::vector<LandmarkIdx>& expected, const PosePrior& prior,
                                       const ExpectedFeaturesOptions& options) {
+  if (!Spend(frame.work().get(), Work::kLandmark, expected.size()))
+    return Localization{.reason = NoFix::kOverBudget, .message = "no work is left (budget_ms)"};
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(expected, false));
   const auto num_of_unknown_size =
       std::count_if(landmarks->landmarks.begin(), landmarks->landmarks.end(),
@@ -98,7 +101,8 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                         .message = fmt::format("of {} of {} landmarks the size is not known",
                                                num_of_unknown_size, expected.size())};
   }
-  CAIRN_ASSIGN_OR_RETURN(Query query, localizer.CoarseQueryFromImage(*frame.image(), frame.camera()));
+  CAIRN_ASSIGN_OR_RETURN(Query query,
+                         localizer.CoarseQueryFromImage(*frame.image(), frame.camera(), frame.work()));
   if (frame.up()) CAIRN_RETURN_IF_ERROR(localizer.SetUp(*frame.up(), &query));
   query.readout = frame.ReadoutOf(prior.cam_from_world);
   const int num_features = static_cast<int>(query.features.keypoints.size());
@@ -122,6 +126,7 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
         return IsLikeAny(keypoint, sights, kMaxRadii * options.fine_radius_px);
       },
       &query));
+  if (static_cast<int>(query.features.keypoints.size()) == num_features) return found;
   return localizer.Sharpen(query, *landmarks, std::move(found));
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
@@ -110,12 +111,16 @@ Result<Localization> RegionTracker::TrackFrame(QueryFrame* frame) {
     const std::optional<PosePrior> prior = Prediction();
     if (prior && options_.readout_ratio > 0)
       frame->set_readout([this](const Pose& pose) { return ReadoutOf(pose); });
+    std::optional<Localization> found;
     if (prior && frame->image() != nullptr && options_.features.map_guided) {
-      CAIRN_ASSIGN_OR_RETURN(const auto found, TrackExpected(*frame, *prior));
-      if (found) return *found;
+      CAIRN_ASSIGN_OR_RETURN(found, TrackExpected(*frame, *prior));
     }
-    CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
-    return TrackQuery(*frame, *query, prior);
+    if (!found) {
+      CAIRN_ASSIGN_OR_RETURN(const Query* query, frame->WithAllFeatures());
+      CAIRN_ASSIGN_OR_RETURN(found, TrackQuery(*frame, *query, prior));
+    }
+    found->work_ms = frame->work()->spent_ms();
+    return *std::move(found);
   });
 }
 
@@ -176,7 +181,8 @@ Result<std::optional<Localization>> RegionTracker::TrackExpected(const QueryFram
                                                                  const PosePrior& prior) {
   const Camera& camera = frame.camera();
   CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-  CAIRN_ASSIGN_OR_RETURN(const auto expected, ExpectedLandmarks(prior, AsFound(map_->head(), camera)));
+  CAIRN_ASSIGN_OR_RETURN(const auto expected,
+                         ExpectedLandmarks(prior, AsFound(map_->head(), camera), frame.work().get()));
   CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeExpected(*map_, expecting_localizer_, frame, expected,
                                                               prior, options_.features));
   if (!found.has_fix() || !Agrees(found, prior)) return std::optional<Localization>();
@@ -190,7 +196,7 @@ Result<Localization> RegionTracker::TrackQuery(const QueryFrame& frame, const Qu
       static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
   // [Sala06 §III] inside a region its features are tracked; here those of its neighbours too
   if (has_features && prior) {
-    CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
+    CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera, query.work.get()));
     CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeByRows(frame, query, std::move(expected), *prior));
     if (found.has_fix() && Agrees(found, *prior)) {
       Update(found);
@@ -228,7 +234,8 @@ Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, cons
 
 Result<Localization> RegionTracker::FindLost(const Query& query) const {
   CAIRN_ASSIGN_OR_RETURN(Vote vote, VoteBy(query));
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> voted, LandmarksOfRegions(*map_, vote.regions));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> voted,
+                         LandmarksOfRegions(*map_, vote.regions, kAnyNum, query.work.get()));
   Localization found;
   if (!voted.empty()) {
     CAIRN_ASSIGN_OR_RETURN(
@@ -247,17 +254,19 @@ Result<Localization> RegionTracker::FindLost(const Query& query) const {
 }
 
 Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrior& prior,
-                                                                  const Camera& camera) const {
+                                                                  const Camera& camera,
+                                                                  WorkBudget* work) const {
   const RetrieveOptions& retrieve = localizer_.options().retrieve;
-  CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, prior, retrieve));
+  CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, prior, retrieve, work));
   CAIRN_ASSIGN_OR_RETURN(std::vector<RegionIdx> regions, RegionsOfCandidates(*map_, near, retrieve));
   std::erase(regions, region_);
   if (static_cast<int>(regions.size()) > options_.max_num_neighbour_regions)
     regions.resize(options_.max_num_neighbour_regions);
   if (region_ >= 0) regions.push_back(region_);
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks,
+                         LandmarksOfRegions(*map_, regions, kAnyNum, work));
   if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
-    CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near)));
+    CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near), kAnyNum, work));
     landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
     SortUnique(&landmarks);
   }
@@ -267,6 +276,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (!corner) return landmarks;
   const double half_view = std::atan2(corner->head<2>().norm(), corner->z()) +
                            RadFromDeg(options_.max_num_sigmas * prior.sigma_deg);
+  if (!Spend(work, Work::kLandmark, landmarks.size())) return std::vector<LandmarkIdx>();
   CAIRN_ASSIGN_OR_RETURN(const auto set, map_->Gather(landmarks, false));
   std::vector<LandmarkIdx> in_view;
   for (size_t i = 0; i < set->idx.size(); ++i) {
@@ -281,6 +291,11 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
 
 Result<Vote> RegionTracker::VoteBy(const Query& query) const {
   const int max_num_landmarks = localizer_.options().fall_back_max_num_landmarks;
+  const int64_t of_landmark =
+      std::ssize(query.features.keypoints) * WorkBudget::PicosecondsOf(Work::kDescriptorPair);
+  constexpr double kVotesPart = 0.3;
+  if (map_->num_landmarks() > NumAffordable(query.work.get(), of_landmark, kVotesPart))
+    return Vote{.message = "for votes no work is left (budget_ms)"};
   if (map_->num_landmarks() > max_num_landmarks) {
     return Vote{.message = fmt::format("the map's {} landmarks are too many to vote, at most {} may "
                                        "(fall_back_max_num_landmarks)",
@@ -291,7 +306,7 @@ Result<Vote> RegionTracker::VoteBy(const Query& query) const {
   for (const Correspondence& match : MatchLandmarks(query, *all, localizer_.options().match)) {
     visible.push_back(match.landmark);
   }
-  return VoteForRegions(*map_, visible, options_.votes);
+  return VoteForRegions(*map_, visible, options_.votes, query.work.get());
 }
 
 bool RegionTracker::Agrees(const Localization& found, const PosePrior& prior) const {

@@ -96,7 +96,8 @@ class RegionTracker {
   // Found by the prediction, without the features of all of the image; nothing if not.
   Result<std::optional<Localization>> TrackExpected(const QueryFrame& frame, const PosePrior& prior);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
-  Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
+  Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera,
+                                                     WorkBudget* work) const;
   // The visible landmarks vote for their regions.
   Result<Vote> VoteBy(const Query& query) const;
   Result<Localization> FindLost(const Query& query) const;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
 
@@ -34,8 +34,9 @@ OptionTable DescribeOptions(VoteOptions* o) {
   };
 }
 
-Result<int> MostInView(const Map& map, RegionIdx region) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(map, {region}));
+Result<int> MostInView(const Map& map, RegionIdx region, WorkBudget* work) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<LandmarkIdx> landmarks,
+                         LandmarksOfRegions(map, {region}, kAnyNum, work));
   std::set<int32_t> image_blocks;
   for (const LandmarkIdx landmark : landmarks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block,
@@ -45,14 +46,17 @@ Result<int> MostInView(const Map& map, RegionIdx region) {
   int most = 0;
   for (const int32_t ordinal : image_blocks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
-    for (const MapImage& image : block->images) most = std::max(most, NumShared(image.landmarks, landmarks));
+    for (const MapImage& image : block->images) {
+      if (!Spend(work, Work::kListed, image.landmarks.size() + landmarks.size())) return most;
+      most = std::max(most, NumShared(image.landmarks, landmarks));
+    }
   }
   return most;
 }
 
-Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen,
-                            const VoteOptions& options) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, seen));
+Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen, const VoteOptions& options,
+                            WorkBudget* work) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, seen, work));
   Vote vote;
   if (votes.empty()) {
     vote.message = fmt::format("none of the {} landmarks in view belongs to a region", seen.size());
@@ -67,7 +71,7 @@ Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen
     }
     int num_needed = std::max(kLeastVotes, options.min_num_votes);
     if (num_votes < num_needed) {
-      CAIRN_ASSIGN_OR_RETURN(const int in_view, MostInView(map, region));
+      CAIRN_ASSIGN_OR_RETURN(const int in_view, MostInView(map, region, work));
       const int of_these = static_cast<int>(std::ceil(options.min_vote_ratio * in_view));
       num_needed = std::max(kLeastVotes, std::min(options.min_num_votes, of_these));
     }

@@ -8,6 +8,8 @@
 
 namespace cairn {
 
+class WorkBudget;  // core/work/work_budget.h
+
 // Which regions a lost robot may be in [Sala06 §III]: the landmarks that it sees vote for the regions that
 // have them, and "regions with at least k votes are candidates".  The source's camera sees all around, and
 // all k.  Here a camera sees a part of a region's landmarks, and a query misses some of those: a region is a
@@ -35,7 +37,7 @@ inline constexpr int kLeastVotes = 2;
 
 // The most landmarks of a region that any one image of the survey shows.  O(images that see them).  Errors:
 // as Map::Images.
-Result<int> MostInView(const Map& map, RegionIdx region);
+Result<int> MostInView(const Map& map, RegionIdx region, WorkBudget* work = nullptr);
 
 // The candidates.
 struct Vote {
@@ -43,6 +45,7 @@ struct Vote {
   std::string message;             // without candidates: what was found and needed
 };
 // Errors: as MostInView.
-Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen, const VoteOptions& options);
+Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen, const VoteOptions& options,
+                            WorkBudget* work = nullptr);
 
 }  // namespace cairn

@@ -262,8 +262,10 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
     table.push_back({.name = name, .value = value, .help = help, .min = -1000, .max = 1000});
   }
   OptionTable localizer = DescribeOptions(&o->localizer);
-  std::erase_if(localizer, [](const Option& option) {  // images of a survey come without gravity
-    return option.name == "floor_up_sigma_deg" || option.name == "max_up_sigmas";
+  // Images of a survey come without gravity, and how fast a robot is nobody knows yet.
+  std::erase_if(localizer, [](const Option& option) {
+    return option.name == "floor_up_sigma_deg" || option.name == "max_up_sigmas" ||
+           option.name == "budget_ms" || option.name == "core_speed";
   });
   table.insert(table.end(), localizer.begin(), localizer.end());
   return table;

@@ -126,8 +126,8 @@ TEST_F(CApi, RigsAndGravityAreThoseOfTheCxxApi) {
   EXPECT_NE(cairn_localize(localizer, &narrow, nullptr, nullptr, &fix), CAIRN_OK);
   ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK);
   EXPECT_EQ(fix.has_fix, 1);
-  EXPECT_STREQ(cairn_reason_name(CAIRN_TILTED), "tilted");
-  EXPECT_STREQ(cairn_reason_name(CAIRN_TILTED + 1), "unknown");
+  EXPECT_STREQ(cairn_reason_name(CAIRN_OVER_BUDGET), "over_budget");
+  EXPECT_STREQ(cairn_reason_name(CAIRN_OVER_BUDGET + 1), "unknown");
 
   const auto expect_misuse = [&](int32_t code, const char* words) {
     EXPECT_EQ(code, CAIRN_INVALID_ARGUMENT);

@@ -422,6 +422,9 @@ class Fix:
     def probability(self) -> float:
         """P(the fix is right), by how much of what an image from there should show is found, and by what other places explain; without a fix 0, but for "improbable", and for "ambiguous": that one of several poses is right"""
     @property
+    def work_ms(self) -> float:
+        """What the answer took: milliseconds of the core on which work was measured, counted and not timed; at most budget_ms times core_speed"""
+    @property
     def region(self) -> int:
         """The one with most inliers; -1: none"""
     @property

@@ -91,6 +91,24 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
   EXPECT_TRUE(localize(std::nullopt).has_fix());
 }
 
+// Whatever it may take: the check is never what is left out.
+TEST(Localizer, ABudgetMakesNoFixOfLookAlikes) {
+  const auto map = *Map::FromRows(RoomsAlike(2));
+  const Features features = RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {}, 3);
+  int num_ambiguous = 0, num_over = 0;
+  for (double budget_ms = 0.5; budget_ms < 60; budget_ms *= 1.15) {
+    LocalizerOptions options;
+    options.budget_ms = budget_ms;
+    const Localization found = *Localizer(map, options).LocalizeFeatures(features, Room().camera);
+    EXPECT_LE(found.work_ms, budget_ms + 1e-9);
+    EXPECT_FALSE(found.has_fix()) << budget_ms;
+    num_ambiguous += found.reason == NoFix::kAmbiguous ? 1 : 0;
+    num_over += found.reason == NoFix::kOverBudget ? 1 : 0;
+  }
+  EXPECT_GE(num_ambiguous, 5);
+  EXPECT_GE(num_over, 5);
+}
+
 // What is matched leads to the room and to the second one, each with half of what it shows; the third is like
 // the first.
 TEST(Localizer, NamesAllPlacesThatLookAlikeWhereItIsOneOfTwo) {

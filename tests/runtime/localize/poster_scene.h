@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "core/camera/pixel_ray.h"
 #include "core/features/sift.h"
 #include "runtime/localize/localizer_options.h"
+#include "runtime/map/map.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
@@ -108,6 +110,16 @@ inline LocalizerOptions PosterOptions() {
   LocalizerOptions options;
   options.match.max_ratio = 0.95;
   return options;
+}
+
+inline const PosterScene& Poster() {
+  static const PosterScene scene = MakePosterScene(1);
+  return scene;
+}
+
+inline const std::shared_ptr<const Map>& PosterMap() {
+  static const std::shared_ptr<const Map> map = *Map::FromRows(MakePosterMap(Poster()));
+  return map;
 }
 
 // Between the views, so that most of a feature's copies in the map are one place seen from two sides.

@@ -17,16 +17,6 @@
 namespace cairn {
 namespace {
 
-const PosterScene& Poster() {
-  static const PosterScene scene = MakePosterScene(1);
-  return scene;
-}
-
-const std::shared_ptr<const Map>& PosterMap() {
-  static const std::shared_ptr<const Map> map = *Map::FromRows(MakePosterMap(Poster()));
-  return map;
-}
-
 std::vector<LandmarkIdx> AllOf(const Map& map) {
   std::vector<LandmarkIdx> all(map.num_landmarks());
   std::iota(all.begin(), all.end(), 0);

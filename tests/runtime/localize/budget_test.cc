@@ -1,0 +1,186 @@
+// Answers that may take so much work and no more.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/work/work_budget.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
+#include "runtime/track/region_tracker.h"
+#include "tests/runtime/localize/poster_scene.h"
+#include "tests/runtime/localize/room_drive.h"
+
+namespace cairn {
+namespace {
+
+constexpr double kRounding = 1e-9;  // of ms
+
+const std::vector<double>& Budgets() {  // ms, from nothing to more than all of it takes
+  static const std::vector<double> budgets{0.01, 0.2, 0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 40, 1000};
+  return budgets;
+}
+
+LocalizerOptions WithBudget(double budget_ms, LocalizerOptions options = {}) {
+  options.budget_ms = budget_ms;
+  return options;
+}
+
+void ExpectSame(const Localization& a, const Localization& b) {
+  EXPECT_EQ(a.reason, b.reason);
+  EXPECT_EQ(a.message, b.message);
+  EXPECT_EQ(a.cam_from_world.Matrix(), b.cam_from_world.Matrix());
+  EXPECT_EQ(a.covariance, b.covariance);
+  EXPECT_EQ(a.probability, b.probability);
+  EXPECT_EQ(a.work_ms, b.work_ms);
+}
+
+double SquaredError(const Localization& found, const Pose& truth) {
+  const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
+  return error.dot(found.covariance.ldlt().solve(error));
+}
+
+TEST(Budget, OfFeaturesIsKeptWhateverItIs) {
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const Features features = RenderFeatures(Room(), truth, {}, 3);
+  const Localization any = *Localizer(RoomMap()).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(any.has_fix());
+  EXPECT_GT(any.work_ms, 0.5);
+  int num_fixes = 0, num_over = 0;
+  for (const double budget_ms : Budgets()) {
+    SCOPED_TRACE(budget_ms);
+    const auto localize = [&] {
+      return *Localizer(RoomMap(), WithBudget(budget_ms)).LocalizeFeatures(features, Room().camera);
+    };
+    const Localization found = localize();
+    ExpectSame(found, localize());
+    EXPECT_LE(found.work_ms, budget_ms + kRounding);
+    if (found.has_fix()) {
+      ++num_fixes;
+      EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+      EXPECT_LT(SquaredError(found, truth), 17);  // 99 % of 6 degrees of freedom
+    } else {
+      ++num_over;
+      EXPECT_EQ(found.reason, NoFix::kOverBudget) << found.message;
+      EXPECT_THAT(found.message, testing::HasSubstr("budget_ms"));
+      EXPECT_LT(budget_ms, any.work_ms);
+    }
+  }
+  EXPECT_GE(num_fixes, 4);
+  EXPECT_GE(num_over, 3);
+  EXPECT_STREQ(NoFixName(NoFix::kOverBudget), "over_budget");
+  Localization all = *Localizer(RoomMap(), WithBudget(1000)).LocalizeFeatures(features, Room().camera);
+  ExpectSame(all, any);
+}
+
+TEST(Budget, IsOfACoreOfThisSpeed) {
+  const Features features = RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {}, 3);
+  LocalizerOptions fast = WithBudget(2), slow = WithBudget(8);
+  fast.core_speed = 2;
+  slow.core_speed = 0.5;
+  ExpectSame(*Localizer(RoomMap(), fast).LocalizeFeatures(features, Room().camera),
+             *Localizer(RoomMap(), slow).LocalizeFeatures(features, Room().camera));
+}
+
+// Of all scales where there is room for them; else of the image's own pixels, of coarser and coarser scales.
+TEST(Budget, OfAnImageGoesToFewerFeatures) {
+  const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
+  const Camera& camera = Poster().camera;
+  const Localizer any(PosterMap(), PosterOptions());
+  const Query all = *any.QueryFromImage(grey, camera);
+  EXPECT_EQ(all.min_scale_px, 0);
+  EXPECT_EQ(all.work->num(Work::kWholePixel), grey.cols * grey.rows);
+  EXPECT_EQ(all.work->num(Work::kFeature), std::ssize(all.features.keypoints));
+  const double all_ms = all.work->spent_ms();
+  std::vector<double> least_scales;
+  for (double part = 0.1; part < 4; part *= 1.2) {
+    const Localizer localizer(PosterMap(), WithBudget(part * all_ms, PosterOptions()));
+    const Query query = *localizer.QueryFromImage(grey, camera);
+    EXPECT_LE(query.work->spent_ms(), 0.75 * part * all_ms);
+    if (query.features.keypoints.empty()) {
+      EXPECT_TRUE(query.work->is_spent());
+      EXPECT_TRUE(least_scales.empty());
+      const Localization none = *Localizer(localizer).Localize(grey, camera);
+      EXPECT_EQ(none.reason, NoFix::kOverBudget);
+      EXPECT_THAT(none.message, testing::HasSubstr("features alone"));
+      continue;
+    }
+    if (least_scales.empty() || least_scales.back() != query.min_scale_px)
+      least_scales.push_back(query.min_scale_px);
+  }
+  const double coarse_px = CoarseSiftScalePx(grey.size(), PosterOptions().sift);
+  EXPECT_THAT(least_scales, testing::ElementsAre(2 * coarse_px, coarse_px, 0.5 * coarse_px, 0));
+}
+
+TEST(Budget, OfAnImageIsKeptWhateverItIs) {
+  const cv::Mat grey = RenderPoster(Poster(), PosterQueryPose());
+  const double any_ms = Localizer(PosterMap(), PosterOptions()).Localize(grey, Poster().camera)->work_ms;
+  int num_fixes = 0;
+  for (double budget_ms = 0.1 * any_ms; budget_ms < 3 * any_ms; budget_ms *= 1.3) {
+    SCOPED_TRACE(budget_ms);
+    const Localization found =
+        *Localizer(PosterMap(), WithBudget(budget_ms, PosterOptions())).Localize(grey, Poster().camera);
+    EXPECT_LE(found.work_ms, budget_ms + kRounding);
+    if (!found.has_fix()) continue;
+    ++num_fixes;
+    EXPECT_LT(CenterErrorM(found.cam_from_world, PosterQueryPose()), 0.05);
+  }
+  EXPECT_GE(num_fixes, 4);
+}
+
+// A frame that finds nothing by what was expected has what is left for another try.
+TEST(Budget, OfAFrameIsKeptThroughTheDark) {
+  const double frame_ms = [] {
+    RegionTracker tracker(RoomMap());
+    double most_ms = 0;
+    for (int i = 0; i < 6; ++i)
+      most_ms = std::max(
+          most_ms, tracker.TrackFeatures(RenderFeatures(Room(), OnDrive(i), {}, i), Room().camera)->work_ms);
+    return most_ms;
+  }();
+  for (const double part : {0.3, 0.6, 1.0, 1.5, 3.0}) {
+    SCOPED_TRACE(part);
+    RegionTracker tracker(RoomMap(), WithBudget(part * frame_ms));
+    int num_fixes = 0;
+    for (int i = 0; i < 20; ++i) {
+      const bool is_dark = i > 8 && i < 12;
+      const Features features =
+          RenderFeatures(Room(), OnDrive(i), {.detection_ratio = is_dark ? 0.0 : 0.7}, i);
+      const Localization found = *tracker.TrackFeatures(features, Room().camera);
+      EXPECT_LE(found.work_ms, part * frame_ms + kRounding);
+      if (!found.has_fix()) continue;
+      ++num_fixes;
+      EXPECT_FALSE(is_dark);
+      EXPECT_LT(CenterErrorM(found.cam_from_world, OnDrive(i)), 0.05);
+    }
+    if (part > 1) EXPECT_EQ(num_fixes, 17);
+  }
+}
+
+TEST(Budget, OfARigIsOfAllItsImages) {
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const Pose turned{Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(90), Eigen::Vector3d::UnitY())), {}};
+  const auto rig = [&] {
+    return std::vector<RigFeatures>{{RenderFeatures(Room(), truth, {}, 3), Room().camera, Pose()},
+                                    {RenderFeatures(Room(), turned * truth, {}, 4), Room().camera, turned}};
+  };
+  const Localization any = *Localizer(RoomMap()).LocalizeRigFeatures(rig());
+  ASSERT_TRUE(any.has_fix());
+  for (const double part : {0.1, 0.4, 0.7, 1.0, 10.0}) {
+    const double budget_ms = part * any.work_ms;
+    const Localization found = *Localizer(RoomMap(), WithBudget(budget_ms)).LocalizeRigFeatures(rig());
+    EXPECT_LE(found.work_ms, budget_ms + kRounding);
+    if (part == 10.0) ExpectSame(found, any);
+    if (found.has_fix()) EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+  }
+}
+
+TEST(Budget, OptionsAreChecked) {
+  LocalizerOptions options = WithBudget(-1);
+  EXPECT_FALSE(CheckOptions(DescribeOptions(&options)).ok());
+  options = WithBudget(5);
+  options.core_speed = 0;
+  EXPECT_FALSE(CheckOptions(DescribeOptions(&options)).ok());
+}
+
+}  // namespace
+}  // namespace cairn
