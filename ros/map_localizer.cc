@@ -112,6 +112,9 @@ struct MapLocalizer::State {
   Status CheckBudget() const {
     LocalizerOptions options = WithBudget(parameters);
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&options)));
+    if (parameters.budget_ms == 0 && parameters.core_speed != 1)
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "~core_speed is of ~budget_ms; set that, or leave it out");
     if (parameters.budget_ms == 0 || !parameters.where) return Ok();
     return MakeError(
         ErrorCode::kInvalidArgument,

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cstdlib>
 #include <fstream>
 #include <string>
@@ -31,6 +32,7 @@ extern "C" {
 void* __libc_malloc(size_t num_bytes);
 void* __libc_realloc(void* block, size_t num_bytes);
 void* __libc_memalign(size_t alignment, size_t num_bytes);
+void* __libc_calloc(size_t num, size_t num_bytes);
 
 void* malloc(size_t num_bytes) {
   ++num_requests;
@@ -39,6 +41,19 @@ void* malloc(size_t num_bytes) {
 void* realloc(void* block, size_t num_bytes) {
   ++num_requests;
   return __libc_realloc(block, num_bytes);
+}
+void* calloc(size_t num, size_t num_bytes) {
+  ++num_requests;
+  return __libc_calloc(num, num_bytes);
+}
+void* aligned_alloc(size_t alignment, size_t num_bytes) {
+  ++num_requests;
+  return __libc_memalign(alignment, num_bytes);
+}
+int posix_memalign(void** block, size_t alignment, size_t num_bytes) {
+  ++num_requests;
+  *block = __libc_memalign(alignment, num_bytes);
+  return *block == nullptr ? ENOMEM : 0;
 }
 void* memalign(size_t alignment, size_t num_bytes) {
   ++num_requests;

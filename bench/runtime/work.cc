@@ -28,9 +28,9 @@ namespace {
 
 constexpr int kNumKinds = static_cast<int>(Work::kNum);
 constexpr std::array<const char*, kNumKinds> kNames = {
-    "whole pixel", "undoubled pixel", "coarse pixel", "fine pixel", "feature",   "ray",     "word",
-    "posting",     "image",           "pair",         "landmark",   "listed",    "attempt", "sample",
-    "score",       "refine",          "project",      "near",       "match pair"};
+    "whole pixel", "undoubled pixel", "coarse pixel", "fine pixel", "shrunk pixel", "feature",   "ray",
+    "word",        "posting",         "image",        "pair",       "landmark",     "listed",    "attempt",
+    "sample",      "score",           "refine",       "project",    "near",         "match pair"};
 
 struct Row {
   std::string kind;

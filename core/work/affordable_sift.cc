@@ -29,10 +29,10 @@ constexpr std::array<Scales, 5> kAll = {{{Work::kWholePixel, std::nullopt, 1000}
 constexpr std::array<Scales, 2> kCoarse = {{{Work::kCoarsePixel, SiftScales::kCoarse, 150},
                                             {Work::kUndoubledPixel, SiftScales::kAll, 100, kMostPart, 2}}};
 
-double MinScalePx(cv::Size image, const SiftOptions& options, const Scales& scales) {
+double MinScalePx(cv::Size image, const SiftOptions& sift, const Scales& scales) {
   if (!scales.undoubled) return 0;
-  const double coarse_px = CoarseSiftScalePx(image, options);
-  return *scales.undoubled == SiftScales::kCoarse ? coarse_px : 0.5 * coarse_px * scales.shrink;
+  const double coarse_px = CoarseSiftScalePx(image, sift);
+  return *scales.undoubled == SiftScales::kCoarse ? coarse_px : 0.5 * coarse_px;
 }
 
 }  // namespace
@@ -43,9 +43,13 @@ Result<std::optional<AffordedSift>> AffordableSift(const cv::Mat& grey, const Si
   of_feature_ps += WorkBudget::PicosecondsOf(Work::kFeature);
   for (const Scales& scales : coarse ? std::span<const Scales>(kCoarse) : std::span<const Scales>(kAll)) {
     SiftOptions sift = options;
-    sift.max_image_side_px = std::min(sift.max_image_side_px, std::max(grey.cols, grey.rows) / scales.shrink);
+    sift.max_image_side_px =
+        std::min(options.max_image_side_px, std::max(grey.cols, grey.rows)) / scales.shrink;
     const int64_t num_pixels = NumSiftPixels(grey.size(), sift);
-    const int64_t of_pixels_ps = num_pixels * WorkBudget::PicosecondsOf(scales.pixel);
+    const auto num_shrunk =
+        static_cast<int64_t>(num_pixels < static_cast<int64_t>(grey.total()) ? grey.total() : 0);
+    const int64_t of_pixels_ps = num_pixels * WorkBudget::PicosecondsOf(scales.pixel) +
+                                 num_shrunk * WorkBudget::PicosecondsOf(Work::kShrunkPixel);
     const auto num_affordable = [&](double part) {
       return NumAffordable(work, of_feature_ps, part) - of_pixels_ps / of_feature_ps;
     };
@@ -54,11 +58,12 @@ Result<std::optional<AffordedSift>> AffordableSift(const cv::Mat& grey, const Si
     const int64_t num = std::max<int64_t>(fewest, num_affordable(kPart));
     sift.max_num_features = static_cast<int>(std::min<int64_t>(options.max_num_features, num));
     Spend(work, scales.pixel, num_pixels);
+    Spend(work, Work::kShrunkPixel, num_shrunk);
     CAIRN_ASSIGN_OR_RETURN(Features features, scales.undoubled
                                                   ? ExtractUndoubledSift(grey, sift, *scales.undoubled)
                                                   : ExtractSift(grey, sift));
     Spend(work, Work::kFeature, features.keypoints.size());
-    return std::optional(AffordedSift{std::move(features), MinScalePx(grey.size(), options, scales)});
+    return std::optional(AffordedSift{std::move(features), MinScalePx(grey.size(), sift, scales)});
   }
   return std::optional<AffordedSift>();
 }

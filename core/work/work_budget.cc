@@ -15,6 +15,7 @@ constexpr std::array<int64_t, static_cast<size_t>(Work::kNum)> kPicoseconds = {
     19'000,       // kUndoubledPixel
     13'000,       // kCoarsePixel
     5'500,        // kFinePixel
+    300,          // kShrunkPixel
     3'800'000,    // kFeature
     570'000,      // kRay
     800'000,      // kWord
@@ -36,13 +37,14 @@ constexpr std::array<int64_t, static_cast<size_t>(Work::kNum)> kPicoseconds = {
 
 WorkBudget::WorkBudget(double ms) {
   constexpr double kMostMs = 1e9;
-  if (ms > 0 && ms < kMostMs) total_ps_ = limit_ps_ = std::llround(1e9 * ms);
+  if (ms == 0 || ms >= kMostMs) return;
+  total_ps_ = limit_ps_ = ms > 0 ? std::llround(1e9 * ms) : 0;
 }
 
 bool WorkBudget::Spend(Work work, int64_t num) {
   const int64_t ps = num * PicosecondsOf(work);
   is_spent_ = is_spent_ || ps > limit_ps_ - spent_ps_;
-  if (is_spent_) return false;
+  if (is_spent()) return false;
   spent_ps_ += ps;
   nums_[static_cast<size_t>(work)] += num;
   return true;

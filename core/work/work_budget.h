@@ -13,6 +13,7 @@ enum class Work {
   kUndoubledPixel,  // SiftScales::kAll
   kCoarsePixel,     // SiftScales::kCoarse
   kFinePixel,       // SiftScales::kFine
+  kShrunkPixel,     // of an image that is made smaller before
   kFeature,         // an orientation and a descriptor
   kRay,             // of a feature, and its descriptor in the order in which it is matched
   kWord,            // a feature's word in the vocabulary
@@ -36,7 +37,7 @@ enum class Work {
 class WorkBudget {
  public:
   WorkBudget() = default;  // any amount
-  // So many milliseconds of that core; 0: any amount.  REQUIRES: >= 0
+  // So many milliseconds of that core; 0: any amount; less, or no number: none at all.
   explicit WorkBudget(double ms);
 
   // Whether there is room for so many pieces, which count then; if not, it is spent from now on: what asks
@@ -44,8 +45,9 @@ class WorkBudget {
   bool Spend(Work work, int64_t num);
   // What it was spent on.
   int64_t num(Work work) const { return nums_[static_cast<size_t>(work)]; }
-  bool is_spent() const { return is_spent_; }
-  void GiveUp() { is_spent_ = true; }
+  bool is_spent() const { return is_spent_ || gave_up_; }
+  // From now on it is spent, beyond a share, too.
+  void GiveUp() { gave_up_ = true; }
   bool is_limited() const { return limit_ps_ != kUnlimited; }
   double spent_ms() const { return 1e-9 * static_cast<double>(spent_ps_); }
   double total_ms() const { return 1e-9 * static_cast<double>(total_ps_); }
@@ -74,6 +76,7 @@ class WorkBudget {
   int64_t limit_ps_ = kUnlimited;  // of the share
   int64_t spent_ps_ = 0;
   bool is_spent_ = false;
+  bool gave_up_ = false;
   std::array<int64_t, static_cast<size_t>(Work::kNum)> nums_{};
 };
 

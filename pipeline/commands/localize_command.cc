@@ -276,7 +276,7 @@ void OfferToLog(Answer* answer, std::optional<RobotLog>* log) {
   const MachineClocks now = ReadMachineClocks();
   const Result<bool> kept = [&]() -> Result<bool> {
     if (!(*log)->IsWanted(cam_from_world, now)) return false;
-    const auto query = answer->frame->WithAllFeatures();
+    const auto query = answer->frame->WithAllFeaturesForLog();
     if (!query.ok()) return false;  // no fault of the log
     return (*log)->Offer({.features = &(*query)->features,
                           .camera = &(*query)->camera,

@@ -179,11 +179,12 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
-    CAIRN_ASSIGN_OR_RETURN(Query query, used->localizer->QueryFromImage(grey, chosen));
-    if (up) CAIRN_RETURN_IF_ERROR(used->localizer->SetUp(*up, &query));
-    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(query, believed));
+    QueryFrame frame(*used->localizer, grey, chosen);
+    if (up) frame.set_up(*up);
+    CAIRN_ASSIGN_OR_RETURN(const Query* query, frame.WithAllFeatures());
+    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(*query, believed));
     Return(FixFrom(found), fix);
-    if (used->log) used->log->Offer(query, found);
+    if (used->log) used->log->Offer(&frame, found);
     return Ok();
   });
 }

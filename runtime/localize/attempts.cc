@@ -49,6 +49,7 @@ Result<Localization> Localizer::LocalizeRig(const std::vector<RigImage>& images,
     std::vector<Query> queries;
     const Budget work = MakeBudget();
     for (const RigImage& image : images) {
+      const WorkBudget::Share share(work.get(), 1.0 / static_cast<double>(images.size() - queries.size()));
       CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromImage(image.grey, image.camera, work));
       CAIRN_RETURN_IF_ERROR(PutOnRig(image.cam_from_rig, &query));
       queries.push_back(std::move(query));
@@ -120,7 +121,7 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
       CAIRN_ASSIGN_OR_RETURN(const auto images, RetrieveByPrior(*map_, PriorOfImage(*prior, query),
                                                                 options_.retrieve, sighting.work));
       CAIRN_ASSIGN_OR_RETURN(auto landmarks,
-                             LandmarksOfImages(*map_, ImagesOf(images), MaxNumMatched(query), sighting.work));
+                             LandmarksOfImages(*map_, ImagesOf(images), kAnyNum, sighting.work));
       near.landmarks.push_back(std::move(landmarks));
     }
     CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, options_.retrieve));
@@ -130,8 +131,7 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
         candidate_ids->push_back(image->image_id);
     }
     CAIRN_ASSIGN_OR_RETURN(const auto regions, RegionsOfCandidates(*map_, candidates, options_.retrieve));
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_regions,
-                           LandmarksOfRegions(*map_, regions, MaxNumMatched(query), sighting.work));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_regions, LandmarksOfRegions(*map_, regions, sighting.work));
     of_regions.landmarks.push_back(std::move(landmarks_of_regions));
     CAIRN_ASSIGN_OR_RETURN(auto landmarks_of_images, LandmarksOfImages(*map_, ImagesOf(candidates),
                                                                        MaxNumMatched(query), sighting.work));
@@ -151,11 +151,7 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
   if (images_first) add(of_images);
   add(std::move(of_regions));
   add(std::move(of_images));
-  const bool may_try_all = std::ranges::all_of(sighting.images, [&](const Query& query) {
-    return map_->num_landmarks() <=
-           std::min<int64_t>(options_.fall_back_max_num_landmarks, MaxNumMatched(query));
-  });
-  if (options_.fall_back_to_all && may_try_all) {
+  if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
     std::vector<LandmarkIdx> all(map_->num_landmarks());
     std::iota(all.begin(), all.end(), 0);
     add(WithAllImages(Scope::kAll, std::move(all), sighting));
@@ -163,12 +159,16 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
   return attempts;
 }
 
+int64_t Localizer::MaxNumGuided(const Sighting& sighting, size_t num_poses) {
+  constexpr double kGuidedPart = 0.5;
+  return NumAffordable(sighting.work, PicosecondsOfGuided(),
+                       kGuidedPart / static_cast<double>(num_poses * sighting.images.size()));
+}
+
 Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& sighting,
                                                                const std::vector<Correspondence>& inliers,
-                                                               const Pose& rig_from_world) const {
-  constexpr double kGuidedPart = 0.5;
-  const int64_t max_num =
-      NumAffordable(sighting.work, PicosecondsOfGuided(), kGuidedPart / sighting.num_images());
+                                                               const Pose& rig_from_world,
+                                                               int64_t max_num) const {
   if (sighting.num_images() == 1)
     return CovisibleLandmarks(*map_, LandmarksOf(inliers), options_.match, max_num, sighting.work);
   CAIRN_ASSIGN_OR_RETURN(const auto matched, map_->Gather(LandmarksOf(inliers), false));
@@ -187,9 +187,10 @@ Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& s
       CAIRN_ASSIGN_OR_RETURN(
           seen, CovisibleLandmarks(*map_, LandmarksOf(of_image), options_.match, max_num, sighting.work));
     } else {  // what the survey saw from near the place that the others give it
-      CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
-                             NearestViews(*map_, sighting.images[i].cam_from_rig * rig_from_world, radius_m,
-                                          one_view.same_view_deg, options_.match.guided_num_images));
+      CAIRN_ASSIGN_OR_RETURN(
+          const std::vector<NearView> near,
+          NearestViews(*map_, sighting.images[i].cam_from_rig * rig_from_world, radius_m,
+                       one_view.same_view_deg, options_.match.guided_num_images, sighting.work));
       std::vector<int32_t> images;
       for (const NearView& view : near) images.push_back(view.image);
       CAIRN_ASSIGN_OR_RETURN(seen, LandmarksOfImages(*map_, images, max_num, sighting.work));

@@ -68,8 +68,8 @@ std::vector<LandmarkIdx> Thinned(std::vector<LandmarkIdx> landmarks, int64_t max
 
 // Part of what is left for an answer that goes to its first poses at most; what follows makes it sure.
 constexpr double kEstimatePart = 0.5;
-// The same of each attempt after one that found something, where look-alikes of that may have to be excluded.
-constexpr double kMoreAttemptsPart = 0.5;
+// Least part of the landmarks that an attempt is at: with fewer it says nothing of where they are.
+constexpr double kLeastMatchedPart = 0.5;
 
 // Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
 // not by different places.  Ascending by image and keypoint.
@@ -157,7 +157,10 @@ Status Localizer::CheckImage(const cv::Mat& grey, const Camera& camera) const {
 }
 
 std::shared_ptr<WorkBudget> Localizer::MakeBudget() const {
-  return std::make_shared<WorkBudget>(options_.budget_ms * options_.core_speed);
+  if (options_.budget_ms == 0) return std::make_shared<WorkBudget>();
+  const double ms = options_.budget_ms * options_.core_speed;
+  constexpr double kNone = -1;
+  return std::make_shared<WorkBudget>(ms > 0 ? ms : kNone);
 }
 
 Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work) const {
@@ -176,13 +179,11 @@ Result<Query> Localizer::QueryWithin(const cv::Mat& grey, const Camera& camera, 
       WorkBudget::PicosecondsOf(Work::kRay) + WorkBudget::PicosecondsOf(Work::kWord);
   CAIRN_ASSIGN_OR_RETURN(std::optional<AffordedSift> found,
                          AffordableSift(grey, options_.sift, coarse, of_feature_ps, work.get()));
-  if (!found) {
-    work->GiveUp();
-    found.emplace();
-    found->features.descriptors.resize(0, kDescriptorDim);
-  }
+  const bool had_no_room = !found;
+  if (had_no_room) found.emplace().features.descriptors.resize(0, kDescriptorDim);
   CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(found->features), camera, work));
   query.min_scale_px = found->min_scale_px;
+  query.had_no_room = had_no_room;
   return query;
 }
 
@@ -207,7 +208,10 @@ Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& came
                      features.keypoints.size(), features.descriptors.rows());
   }
   if (!work) work = MakeBudget();
-  Spend(work.get(), Work::kRay, features.keypoints.size());
+  if (!Spend(work.get(), Work::kRay, features.keypoints.size())) {
+    features.keypoints.clear();
+    features.descriptors.resize(0, kDescriptorDim);
+  }
   Query query = MakeQuery(std::move(features), AsFound(map_->head(), camera), options_.measurement);
   query.work = std::move(work);
   return query;
@@ -226,12 +230,16 @@ Status Localizer::SetUp(const SensedUp& up, Query* query) const {
 Result<Localization> Localizer::LocalizeQuery(const Sighting& query,
                                               const std::optional<PosePrior>& prior) const {
   const int num_features = query.num_features();
+  const bool had_no_room =
+      std::ranges::all_of(query.images, [](const Query& image) { return image.had_no_room; });
+  if (had_no_room && query.work != nullptr) query.work->GiveUp();
   if (IsSpent(query.work)) return OverBudget(*query.work, Localization{.num_features = num_features});
   if (num_features < options_.accept.min_num_features) {
     Localization none = Failure(
         NoFix::kTooFewFeatures,
         fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
     none.num_features = num_features;
+    if (query.work != nullptr) none.work_ms = query.work->spent_ms();
     return none;
   }
   return LocalizeBetter(query, prior, Failure(NoFix::kNoCandidates, "no survey image looks like it"));
@@ -250,21 +258,15 @@ Result<Localization> Localizer::LocalizeBetter(const Sighting& sighting,
                                                Localization best) const {
   std::vector<ImageId> candidate_ids;
   WorkBudget* const work = sighting.work;
-  // What else may explain it leaves something for look-alikes of what does.
-  const auto part = [&] { return best.has_places() && MayHaveLookAlikes() ? kMoreAttemptsPart : 1; };
-  std::vector<Attempt> attempts;
-  {
-    const WorkBudget::Share share(work, part());
-    CAIRN_ASSIGN_OR_RETURN(attempts, MakeAttempts(sighting, prior, &candidate_ids));
-  }
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(sighting, prior, &candidate_ids));
   for (const Attempt& attempt : attempts) {
     if (IsSpent(work)) break;
-    const WorkBudget::Share share(work, part());
     CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(sighting, attempt));
     best = BetterOf(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
-  if (IsSpent(work) && !best.has_places()) {
+  // An attempt that was cut short might have led elsewhere.
+  if (IsSpent(work)) {
     best.num_features = sighting.num_features();
     best = OverBudget(*work, std::move(best));
   } else {
@@ -353,7 +355,8 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
     const bool is_known = image > 0 && idx == attempt.landmarks[image - 1];
     const bool all = static_cast<int64_t>(idx.size()) == map_->num_landmarks();
     const int64_t max_num = MaxNumMatched(sighting.images[image]);
-    if (std::ssize(idx) > max_num && !attempt.may_be_thinned) work->GiveUp();
+    const double least_part = attempt.may_be_thinned ? kLeastMatchedPart : 1;
+    if (static_cast<double>(max_num) < least_part * static_cast<double>(idx.size())) work->GiveUp();
     if (is_thinned || !is_known || std::ssize(idx) > max_num) {
       is_thinned = is_thinned || std::ssize(idx) > max_num;
       if (!Spend(work, Work::kLandmark, all ? 0 : std::min<int64_t>(std::ssize(idx), max_num)))
@@ -369,6 +372,7 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   const bool are_same = std::all_of(attempt.landmarks.begin(), attempt.landmarks.end(),
                                     [&](const auto& idx) { return idx == attempt.landmarks.front(); });
   if (!are_same || (is_thinned && sighting.num_images() > 1)) {
+    if (!Spend(work, Work::kLandmark, matches.size())) return OverBudget(*work, std::move(localization));
     CAIRN_ASSIGN_OR_RETURN(landmarks, map_->Gather(LandmarksOf(matches), false));
   }
   localization.num_matches = static_cast<int>(matches.size());
@@ -385,11 +389,17 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   std::optional<PoseEstimate> estimate;
   bool was_cut = false;
   {
-    const WorkBudget::Share share(work, kEstimatePart);
+    // Look-alikes are held against each other: with as many samples as they ask for, or not at all.
+    const WorkBudget::Share share(work, attempt.may_be_thinned ? kEstimatePart : 1);
     estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed, up, work);
     was_cut = IsSpent(work);
   }
-  if (!estimate && was_cut) return OverBudget(*work, std::move(localization));
+  // With more samples there might be a pose, or one of more matches.
+  const auto give_up = [&] {
+    work->GiveUp();
+    return OverBudget(*work, std::move(localization));
+  };
+  if (!estimate && was_cut) return give_up();
   if (!estimate)
     return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose{}", matches.size(), with_gravity));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
@@ -401,6 +411,7 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
                        UsesTwoPoints(measurements, up, options_.estimate) ? 2 : 3);
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
       log10_chance > accept.max_log10_chance) {
+    if (was_cut) return give_up();
     return fail(NoFix::kTooFewInliers,
                 fmt::format("{} of {} matches agree on a pose{}, as they would by chance on 10^{:.1f} poses; "
                             "at least {} matches and at most 10^{:g} poses are needed",
@@ -424,13 +435,14 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
 
 Result<Localizer::FollowedUp> Localizer::FollowUp(const Sighting& sighting,
                                                   const std::vector<Correspondence>& matches,
-                                                  const PoseEstimate& first) const {
+                                                  const PoseEstimate& first, int64_t max_num_guided) const {
   FollowedUp own{static_cast<int>(first.inliers.size()),
                  nullptr,
                  {Select(matches, first.inliers), first.cam_from_world}};
   if (options_.match.guided_num_images == 0) return own;
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
-                         LandmarksToLookFor(sighting, own.found.matches, first.cam_from_world));
+  CAIRN_ASSIGN_OR_RETURN(
+      std::vector<LandmarkIdx> seen,
+      LandmarksToLookFor(sighting, own.found.matches, first.cam_from_world, max_num_guided));
   if (!Spend(sighting.work, Work::kLandmark, seen.size())) return own;
   CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(std::move(seen), false));
   GuidedMatches guided =
@@ -457,10 +469,11 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
     if (reason != NoFix::kImprobable) localization.probability = 0;
     return localization;
   };
+  const int64_t max_num_guided = MaxNumGuided(sighting, firsts.size());
   std::vector<FollowedUp> followed_up;
   size_t most = 0;
   for (const PoseEstimate& first : firsts) {
-    CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(sighting, matches, first));
+    CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(sighting, matches, first, max_num_guided));
     if (IsSpent(work)) return OverBudget(*work, std::move(localization));
     followed_up.push_back(std::move(next));
     if (followed_up.back().found.matches.size() > followed_up[most].found.matches.size())
@@ -489,13 +502,16 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
                                    best.found.matches.size(), other.found.matches.size()));
     }
     CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(sighting, matched, other));
+    if (IsSpent(work)) return OverBudget(*work, std::move(localization));
     odds_elsewhere += OddsOfPlace(evidence);
   }
   const LandmarkSet& landmarks = best.covisible ? *best.covisible : matched;
   if (best.covisible) {
-    Verdict verdict = JudgeGuided(
-        static_cast<int>(best.found.matches.size()),
-        GuidedByChance(sighting, landmarks, best.found.cam_from_world, options_.match), options_.accept);
+    const double num_by_chance =
+        GuidedByChance(sighting, landmarks, best.found.cam_from_world, options_.match);
+    if (IsSpent(work)) return OverBudget(*work, std::move(localization));
+    Verdict verdict =
+        JudgeGuided(static_cast<int>(best.found.matches.size()), num_by_chance, options_.accept);
     if (verdict.reason != NoFix::kNone) {
       localization.num_inliers = 0;
       return fail(verdict.reason, std::move(verdict.message));
@@ -533,6 +549,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
   }
   CAIRN_ASSIGN_OR_RETURN(const double distance,
                          DistanceFromSurvey(*map_, refined->cam_from_world.Center(), work));
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   Verdict verdict =
       JudgePose(*refined, inliers, sighting, distance, options_.accept, LengthUnit(map_->head().frame));
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
@@ -540,6 +557,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
   localization.cam_from_world = refined->cam_from_world;
   localization.covariance = refined->covariance;
   CAIRN_ASSIGN_OR_RETURN(localization.region, RegionWithMost(*map_, LandmarksOf(inliers), work));
+  if (IsSpent(work)) return OverBudget(*work, std::move(localization));
   return localization;
 }
 
@@ -571,6 +589,17 @@ void QueryFrame::set_up(const SensedUp& up) {
   if (!query_) return;
   Query with_up = *query_;
   if (localizer_.SetUp(up, &with_up).ok()) query_ = std::make_shared<const Query>(std::move(with_up));
+}
+
+Result<const Query*> QueryFrame::WithAllFeaturesForLog() {
+  if (!work_->is_limited()) return WithAllFeatures();
+  if (!for_log_) {
+    const auto any_work = std::make_shared<WorkBudget>();
+    CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, any_work)
+                                              : localizer_.QueryFromFeatures(features_, camera_, any_work));
+    for_log_ = std::make_shared<const Query>(std::move(query));
+  }
+  return for_log_.get();
 }
 
 Result<const Query*> QueryFrame::WithAllFeatures() {

@@ -102,7 +102,7 @@ class Localizer {
   Result<Localization> Sharpen(const Query& query, const LandmarkSet& landmarks, Localization fix) const;
 
   const LocalizerOptions& options() const { return options_; }
-  // For an answer to one image, or to one frame.
+  // For one answer, to an image or a frame.
   Budget MakeBudget() const;
 
  private:
@@ -137,11 +137,14 @@ class Localizer {
   Result<Localization> Try(const Sighting& sighting, const Attempt& attempt) const;
   // What a first pose, of these matches, leads to.
   Result<FollowedUp> FollowUp(const Sighting& sighting, const std::vector<Correspondence>& matches,
-                              const PoseEstimate& first) const;
-  // The landmarks that the images should show at a pose with these inliers, ascending.
+                              const PoseEstimate& first, int64_t max_num_guided) const;
+  // The landmarks that the images should show at a pose with these inliers, ascending; so many at most.
   Result<std::vector<LandmarkIdx>> LandmarksToLookFor(const Sighting& sighting,
                                                       const std::vector<Correspondence>& inliers,
-                                                      const Pose& rig_from_world) const;
+                                                      const Pose& rig_from_world, int64_t max_num) const;
+  // How many they may be where so many poses are followed up: of each as many, or what they lead to does not
+  // compare.
+  static int64_t MaxNumGuided(const Sighting& sighting, size_t num_poses);
   // What the images show of what they should there.  `matched`: the landmarks that first poses come from.
   Result<PlaceEvidence> EvidenceOf(const Sighting& sighting, const LandmarkSet& matched,
                                    const FollowedUp& followed_up) const;
@@ -154,7 +157,6 @@ class Localizer {
   // it.
   Result<std::vector<PlaceToTry>> WithLookAlikes(const Sighting& sighting, const std::vector<Pose>& poses,
                                                  const std::optional<PosePrior>& prior) const;
-  bool MayHaveLookAlikes() const;
   // `best`, a fix or one of several places, unless look-alikes of these explain the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                          Localization best) const;
@@ -197,6 +199,8 @@ class QueryFrame {
   const Localizer::Budget& work() const { return work_; }
   // Errors: as Localizer::QueryFromImage, QueryFromFeatures.
   Result<const Query*> WithAllFeatures();
+  // The same, whatever the budget: for a log, to which what is not there is gone.
+  Result<const Query*> WithAllFeaturesForLog();
 
  private:
   Localizer localizer_;
@@ -206,7 +210,8 @@ class QueryFrame {
   std::optional<SensedUp> up_;
   ReadoutAt readout_;
   Localizer::Budget work_;
-  std::shared_ptr<const Query> query_;  // with all features
+  std::shared_ptr<const Query> query_;    // with all features, or those that there was work for
+  std::shared_ptr<const Query> for_log_;  // with all features, where work is limited
 };
 
 }  // namespace cairn

@@ -106,14 +106,10 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
   return places;
 }
 
-bool Localizer::MayHaveLookAlikes() const {
-  return options_.exclude_look_alikes && map_->directory().NumBlocks(BlockKind::kAmbiguity) > 0;
-}
-
 Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
                                                   const std::optional<PosePrior>& prior,
                                                   Localization best) const {
-  if (!MayHaveLookAlikes()) return best;
+  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
   const std::vector<Pose> poses =
       best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(sighting, poses, prior));

@@ -275,10 +275,13 @@ std::vector<Correspondence> MatchGuided(const Sighting& sighting, const Landmark
   std::vector<Correspondence> matches;
   for (int image = 0; image < sighting.num_images(); ++image) {
     const Query& query = sighting.images[image];
-    for (Correspondence match :
-         GuidedSearch(query, landmarks, query.cam_from_rig * rig_from_world, options).Match({0, 0})) {
-      match.image = image;
-      matches.push_back(match);
+    std::vector<Correspondence> of_image =
+        GuidedSearch(query, landmarks, query.cam_from_rig * rig_from_world, options).Match({0, 0});
+    for (Correspondence& match : of_image) match.image = image;
+    if (matches.empty()) {
+      matches = std::move(of_image);
+    } else {
+      matches.insert(matches.end(), of_image.begin(), of_image.end());
     }
   }
   return matches;

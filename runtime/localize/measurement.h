@@ -64,6 +64,7 @@ struct Query {
   Pose cam_from_rig;                 // of a camera of a rig, whose frame `up` is in then
   ReadoutMotion readout;             // poses are those of the middle row
   std::shared_ptr<WorkBudget> work;  // what its answer may cost; null: not counted
+  bool had_no_room = false;          // for any features of its image
 };
 
 // Where a point of the camera's frame in the middle row's moment is seen, in the image or not; as

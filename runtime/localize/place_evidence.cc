@@ -97,6 +97,7 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, 
     CAIRN_ASSIGN_OR_RETURN(
         const std::vector<NearView> near,
         NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews, query.work.get()));
+    if (near.empty()) return evidence;  // no work is left
     std::sort(found_idx[i].begin(), found_idx[i].end());
     CAIRN_ASSIGN_OR_RETURN(PlaceEvidence of_image,
                            EvidenceOfImage(map, query, cam_from_world, near, found_idx[i], num_cells));

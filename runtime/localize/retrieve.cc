@@ -5,7 +5,6 @@
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "core/blocks/map_blocks.h"
@@ -28,6 +27,7 @@ double BoxDistance(const BlockEntry& entry, const Eigen::Vector3d& center) {
 // Blocks of images, those first whose box is nearest to a place: at least so far, block.
 std::vector<std::pair<double, int64_t>> ImageBlocksByDistance(const Map& map, const Eigen::Vector3d& center) {
   std::vector<std::pair<double, int64_t>> order;
+  order.reserve(map.directory().NumBlocks(BlockKind::kImages));
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     order.emplace_back(BoxDistance(map.directory().Entry(BlockKind::kImages, ordinal), center), ordinal);
   }
@@ -92,7 +92,7 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query&
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
   std::vector<double> dots(map.num_images(), 0.0);
   double squared_norm = 0;
-  size_t num_postings = map.num_images();
+  if (!Spend(query.work.get(), Work::kPosting, map.num_images())) return std::vector<Candidate>();
   std::shared_ptr<const WordBlock> block;
   for (size_t begin = 0, end = 0; begin < words.size(); begin = end) {
     const WordIdx word = words[begin];
@@ -102,14 +102,13 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query&
     }
     const std::vector<Posting>& postings = block->postings[word - block->first];
     if (postings.empty()) continue;
-    num_postings += postings.size();
+    if (!Spend(query.work.get(), Work::kPosting, postings.size())) return std::vector<Candidate>();
     // [Mariottini11 §IV] the query vector's entry, a word's count times its inverse document frequency
     const double idf = std::log(documents.count / static_cast<double>(postings.size()));
     const double query_weight = static_cast<double>(end - begin) * idf;
     squared_norm += query_weight * query_weight;
     for (const Posting& posting : postings) dots[posting.document] += query_weight * idf * posting.count;
   }
-  if (!Spend(query.work.get(), Work::kPosting, num_postings)) return std::vector<Candidate>();
   return BestImages(
       dots, std::sqrt(squared_norm), [&](size_t image) { return (*norms)[image]; }, options);
 }
@@ -193,6 +192,7 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
 
 std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
   std::vector<int32_t> images;
+  images.reserve(candidates.size());
   for (const Candidate& candidate : candidates) images.push_back(candidate.image);
   return images;
 }
@@ -239,7 +239,7 @@ Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_
                                            double radius_deg, int max_num, WorkBudget* work) {
   const Eigen::Vector3d center = cam_from_world.Center();
   std::vector<NearView> nearest;  // ascending
-  nearest.reserve(max_num + 1);
+  nearest.reserve(static_cast<size_t>(std::min<int64_t>(max_num, map.num_images())) + 1);
   const auto is_nearer = [](const NearView& a, const NearView& b) {
     return std::pair(a.squared_distance, a.image) < std::pair(b.squared_distance, b.image);
   };
@@ -270,20 +270,27 @@ Result<int32_t> ImageNearFix(const Map& map, const Localization& found) {
 
 Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
                                                    const RetrieveOptions& options) {
-  std::map<RegionIdx, double> votes;
+  std::vector<std::pair<RegionIdx, double>> votes;  // ascending
   for (const Candidate& candidate : candidates) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(candidate.image));
     if (image->station < 0) continue;
     CAIRN_ASSIGN_OR_RETURN(const auto stations,
                            map.Stations(map.directory().OrdinalOf(BlockKind::kStations, image->station)));
-    for (const RegionIdx region : stations->regions[image->station - stations->first])
-      votes[region] += candidate.score;
+    for (const RegionIdx region : stations->regions[image->station - stations->first]) {
+      const auto at = std::lower_bound(votes.begin(), votes.end(), region,
+                                       [](const auto& vote, RegionIdx value) { return vote.first < value; });
+      if (at != votes.end() && at->first == region) {
+        at->second += candidate.score;
+      } else {
+        votes.insert(at, {region, candidate.score});
+      }
+    }
   }
-  std::vector<std::pair<double, RegionIdx>> order;
-  for (const auto& [region, vote] : votes) order.emplace_back(-vote, region);
-  std::sort(order.begin(), order.end());
+  std::sort(votes.begin(), votes.end(), [](const auto& a, const auto& b) {
+    return std::pair(-a.second, a.first) < std::pair(-b.second, b.first);
+  });
   std::vector<RegionIdx> regions;
-  for (const auto& [vote, region] : order) {
+  for (const auto& [region, vote] : votes) {
     if (static_cast<int>(regions.size()) == options.max_num_regions) break;
     regions.push_back(region);
   }
@@ -332,10 +339,9 @@ Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>&
 }
 
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions,
-                                                    int64_t max_num, WorkBudget* work) {
+                                                    WorkBudget* work) {
   std::vector<LandmarkIdx> landmarks;
   for (const RegionIdx region : regions) {
-    const size_t num_before = landmarks.size();
     CAIRN_ASSIGN_OR_RETURN(const auto of_regions,
                            map.Regions(map.directory().OrdinalOf(BlockKind::kRegions, region)));
     for (const int32_t ordinal : of_regions->landmark_blocks[region - of_regions->first]) {
@@ -346,10 +352,6 @@ Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::v
       if (found == block->regions.end() || found->first != region) continue;
       if (!Spend(work, Work::kListed, found->second.size())) return std::vector<LandmarkIdx>();
       landmarks.insert(landmarks.end(), found->second.begin(), found->second.end());
-    }
-    if (num_before > 0 && std::ssize(landmarks) > max_num) {
-      landmarks.resize(num_before);
-      break;
     }
   }
   SortUnique(&landmarks);

@@ -60,11 +60,11 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
 Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks,
                                  WorkBudget* work = nullptr);
 
-// Landmarks of regions, of images, ascending, each once; of the first of them that have no more than max_num
-// together, or of the first one.
+// Landmarks of regions, of images, ascending, each once; of images of the first that have no more than
+// max_num together, or of the first one.
 constexpr int64_t kAnyNum = std::numeric_limits<int64_t>::max();
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions,
-                                                    int64_t max_num = kAnyNum, WorkBudget* work = nullptr);
+                                                    WorkBudget* work = nullptr);
 Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images,
                                                    int64_t max_num = kAnyNum, WorkBudget* work = nullptr);
 

@@ -61,10 +61,11 @@ class PyLocalizer {
     const auto used = one_thread_.Use();
     const Camera chosen = CameraFor(*map_, grey, camera);
     if (!log_) return ValueOrThrow(localizer_->Localize(grey, chosen, prior, up));
-    Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
-    if (up) ThrowIfError(localizer_->SetUp(*up, &query));
-    Localization found = ValueOrThrow(localizer_->LocalizeQuery(query, prior));
-    log_->Offer(query, found);
+    QueryFrame frame(*localizer_, grey, chosen);
+    if (up) frame.set_up(*up);
+    const Query* query = ValueOrThrow(frame.WithAllFeatures());
+    Localization found = ValueOrThrow(localizer_->LocalizeQuery(*query, prior));
+    log_->Offer(&frame, found);
     return found;
   }
 

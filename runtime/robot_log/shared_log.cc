@@ -67,7 +67,7 @@ void SharedLog::Offer(const Query& query, const Localization& found) {
 
 void SharedLog::Offer(QueryFrame* frame, const Localization& found) {
   const auto query = WithoutExceptions("log a frame", [&]() -> Result<const Query*> {
-    return IsWanted(found) ? frame->WithAllFeatures() : Result<const Query*>(nullptr);
+    return IsWanted(found) ? frame->WithAllFeaturesForLog() : Result<const Query*>(nullptr);
   });
   if (query.ok() && *query != nullptr) Offer(**query, found);
 }

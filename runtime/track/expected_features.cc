@@ -51,6 +51,7 @@ bool IsLikeAny(const Keypoint& keypoint, const std::vector<ExpectedSight>& sight
 std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_from_world,
                                   const Query& query) {
   std::vector<LandmarkIdx> coarse;
+  coarse.reserve(landmarks.idx.size());
   for (size_t i = 0; i < landmarks.idx.size(); ++i) {
     const MapLandmark& landmark = landmarks.landmarks[i];
     const double depth = DepthOfScale(query.camera, cam_from_world * landmark.position);
@@ -67,6 +68,7 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
   const double sigma_rad = LargestSigma(fix.covariance.topLeftCorner<3, 3>());
   const double sigma_m = LargestSigma(fix.covariance.bottomRightCorner<3, 3>());
   std::vector<ExpectedSight> sights;
+  sights.reserve(landmarks.landmarks.size());
   const double focal_px = coarse.camera.MeanFocal();
   for (const MapLandmark& landmark : landmarks.landmarks) {
     const Eigen::Vector3d point = cam_from_world * landmark.position;

@@ -223,6 +223,7 @@ Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, cons
     return localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior);
   Query by_rows = query;
   by_rows.readout = frame.ReadoutOf(prior.cam_from_world);
+  Spend(query.work.get(), Work::kLandmark, expected.size());
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map_->Gather(expected, false));
   CAIRN_ASSIGN_OR_RETURN(Localization found,
                          localizer_.LocalizeAmong(by_rows, Scope::kTrack, std::move(expected), prior));
@@ -235,7 +236,7 @@ Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, cons
 Result<Localization> RegionTracker::FindLost(const Query& query) const {
   CAIRN_ASSIGN_OR_RETURN(Vote vote, VoteBy(query));
   CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> voted,
-                         LandmarksOfRegions(*map_, vote.regions, kAnyNum, query.work.get()));
+                         LandmarksOfRegions(*map_, vote.regions, query.work.get()));
   Localization found;
   if (!voted.empty()) {
     CAIRN_ASSIGN_OR_RETURN(
@@ -263,8 +264,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (static_cast<int>(regions.size()) > options_.max_num_neighbour_regions)
     regions.resize(options_.max_num_neighbour_regions);
   if (region_ >= 0) regions.push_back(region_);
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks,
-                         LandmarksOfRegions(*map_, regions, kAnyNum, work));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions, work));
   if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
     CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near), kAnyNum, work));
     landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
@@ -279,6 +279,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (!Spend(work, Work::kLandmark, landmarks.size())) return std::vector<LandmarkIdx>();
   CAIRN_ASSIGN_OR_RETURN(const auto set, map_->Gather(landmarks, false));
   std::vector<LandmarkIdx> in_view;
+  in_view.reserve(set->idx.size());
   for (size_t i = 0; i < set->idx.size(); ++i) {
     const Eigen::Vector3d point = cam_from_world * set->landmarks[i].position;
     const double distance = point.norm();

@@ -78,7 +78,8 @@ class RegionTracker {
   // Errors: as Localizer::Localize; the state is then as before.  No exception leaves it.
   Result<Localization> Track(const cv::Mat& grey, const Camera& camera);
   Result<Localization> TrackFeatures(Features features, const Camera& camera);
-  // The same of a frame of which others use the features, too.
+  // The same of a frame of which others use the features, too; it has a budget of its own, of the options of
+  // the localizer that it was made with.
   Result<Localization> TrackFrame(QueryFrame* frame);
 
   // Where the next frame is expected; none when lost.

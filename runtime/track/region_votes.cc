@@ -35,8 +35,7 @@ OptionTable DescribeOptions(VoteOptions* o) {
 }
 
 Result<int> MostInView(const Map& map, RegionIdx region, WorkBudget* work) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<LandmarkIdx> landmarks,
-                         LandmarksOfRegions(map, {region}, kAnyNum, work));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(map, {region}, work));
   std::set<int32_t> image_blocks;
   for (const LandmarkIdx landmark : landmarks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block,

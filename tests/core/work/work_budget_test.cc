@@ -79,6 +79,27 @@ TEST(WorkBudget, AShareIsAPartOfWhatIsLeft) {
   EXPECT_TRUE(all.is_spent()) << "the share was all of it";
 }
 
+TEST(WorkBudget, GivingUpInAShareIsForGood) {
+  WorkBudget budget(4);
+  {
+    const WorkBudget::Share half(&budget, 0.5);
+    const WorkBudget::Share quarter(&budget, 0.5);
+    EXPECT_NEAR(1e-9 * static_cast<double>(budget.left_ps()), 1, 1e-6);
+    budget.GiveUp();
+  }
+  EXPECT_TRUE(budget.is_spent());
+  EXPECT_FALSE(budget.Spend(Work::kNear, 1));
+}
+
+TEST(WorkBudget, OfNoNumberOrLessThanNothingIsNone) {
+  for (const double ms : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    WorkBudget budget(ms);
+    EXPECT_TRUE(budget.is_limited());
+    EXPECT_FALSE(budget.Spend(Work::kNear, 1));
+  }
+  EXPECT_FALSE(WorkBudget(1e300).is_limited());
+}
+
 TEST(WorkBudget, SaysHowManyItIsEnoughFor) {
   const WorkBudget budget(1);
   EXPECT_EQ(NumAffordable(&budget, 1'000'000, 1), 1000);
