@@ -6,30 +6,39 @@ CAIRN := build/$(PRESET)/cairn
 DATA ?= ../shared/data
 PREFIX ?= /usr/local
 
-# Debian 12 packages, by what needs them.  The program:
-PACKAGES := build-essential cmake ninja-build ccache pkg-config \
-    libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
+# Debian 12 packages, by what needs them.  What the program is compiled with:
+LIBRARIES := libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     libavformat-dev libavcodec-dev libavutil-dev libswscale-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev \
     liblz4-dev libbz2-dev zlib1g-dev \
-    coinor-libcbc-dev libgeos++-dev libjs-leaflet libjs-chart.js jq
+    coinor-libcbc-dev libgeos++-dev
+# Python's module:
+PACKAGES_PYTHON := pybind11-dev python3 python3-dev python3-numpy
+# Tests in C++:
+LIBRARIES_TEST := libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev
+# The program:
+PACKAGES := build-essential cmake ninja-build ccache pkg-config $(LIBRARIES) libjs-leaflet libjs-chart.js jq
 # Captures without poses, Python's module, ROS's node:
-PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
+PACKAGES_MORE := colmap $(PACKAGES_PYTHON) \
     libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev libnav-msgs-dev
 # Tests and benchmarks: films, a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
-PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 ffmpeg \
+PACKAGES_TEST := $(PACKAGES_MORE) $(LIBRARIES_TEST) sqlite3 ffmpeg \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
     python3-rosbag python3-nav-msgs python3-tf2-msgs \
     debhelper dh-python lintian debootstrap clang libclang-rt-14-dev clang-format clang-tidy
-# Optional: the demo's picture as PNG; for tests of the matching kernels of other processors, an emulation of Intel's
-# instructions, an ARM compiler and an emulator.
-PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
+# Another architecture: its compiler, an emulator, and what fetches its packages.
+PACKAGES_CROSS := g++-aarch64-linux-gnu qemu-user-static mmdebstrap
+# Optional: the demo's picture as PNG; for tests of the kernels of other processors, an emulation of Intel's instructions and
+# what 64-bit ARM needs.
+PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev $(PACKAGES_CROSS)
+# Of another architecture, in a folder of their own: the C library and what is compiled with it.
+PACKAGES_SYSROOT := libc6-dev $(LIBRARIES) $(PACKAGES_PYTHON) $(LIBRARIES_TEST)
 
 SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all help program whole deps deps-all demo tables test bench reproduce maps compile install deb format format-check tidy docs clean
+.PHONY: all help program whole deps deps-all demo tables test bench reproduce maps compile install deb sysroot sysroot-packages format format-check tidy docs clean
 # Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
@@ -95,6 +104,12 @@ install: whole  ## Install program, library, headers, Python module and manual u
 
 deb: deps-all  ## Build the Debian packages into build/deb
 	@scripts/build_packages build/deb
+
+sysroot:  ## Unpack Debian's libraries for arm64 into build/sysroot/arm64, for cmake/arm64.cmake
+	@scripts/make_sysroot arm64 build/sysroot/arm64 $(PACKAGES_SYSROOT)
+
+sysroot-packages:
+	@echo $(PACKAGES_SYSROOT)
 
 format: deps-all  ## Format all sources in place
 	@clang-format -i $(SOURCES)
