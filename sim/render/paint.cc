@@ -25,8 +25,8 @@ void AddNoise(cv::Mat picture, double largest_px, double smallest_px, double sig
       for (int x = 0; x < cols; ++x) coarse.at<float>(y, x) = static_cast<float>(random.Uniform(-1, 1));
     }
     // The first lattice point falls at a random place, so that lattices of octaves do not coincide.
-    const cv::Matx23d map(1 / (wavelength * stretch_x), 0, random.Uniform(), 0, 1 / (wavelength * stretch_y),
-                          random.Uniform());
+    const double shift_y = random.Uniform(), shift_x = random.Uniform();
+    const cv::Matx23d map(1 / (wavelength * stretch_x), 0, shift_x, 0, 1 / (wavelength * stretch_y), shift_y);
     cv::warpAffine(coarse, fine, map, picture.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                    cv::BORDER_REPLICATE);
     const double amplitude = std::pow(wavelength, exponent);
@@ -43,10 +43,11 @@ void AddNoise(cv::Mat picture, double largest_px, double smallest_px, double sig
 // A closed curve of 3 to 9 corners around a centre; filled.
 void FillBlob(cv::Mat picture, cv::Point2d centre, double radius, double value, Random& random) {
   if (random.Uniform() < 0.3) {
+    const double angle_deg = random.Uniform(0, 180), aspect = random.Uniform(0.4, 1);
     const cv::RotatedRect ellipse(
         cv::Point2f(centre),
-        cv::Size2f(static_cast<float>(2 * radius), static_cast<float>(2 * radius * random.Uniform(0.4, 1))),
-        static_cast<float>(random.Uniform(0, 180)));
+        cv::Size2f(static_cast<float>(2 * radius), static_cast<float>(2 * radius * aspect)),
+        static_cast<float>(angle_deg));
     cv::ellipse(picture, ellipse, Grey(value), cv::FILLED, cv::LINE_AA);
     return;
   }
@@ -63,6 +64,12 @@ void FillBlob(cv::Mat picture, cv::Point2d centre, double radius, double value, 
   cv::fillPoly(picture, std::vector<std::vector<cv::Point>>{corners}, Grey(value), cv::LINE_AA, kShift);
 }
 
+// The same around a random place.
+void FillBlobSomewhere(cv::Mat picture, double radius, double value, Random& random) {
+  const double x = random.Uniform(0, picture.cols), y = random.Uniform(0, picture.rows);
+  FillBlob(picture, {x, y}, radius, value, random);
+}
+
 // Opaque shapes over each other with radii of density r^-3: the statistics of natural images at every scale
 // ("dead leaves").  `density` is the number of times that the shapes cover the picture.
 void PaintLeaves(cv::Mat picture, double smallest_px, double density, Random& random) {
@@ -74,8 +81,8 @@ void PaintLeaves(cv::Mat picture, double smallest_px, double density, Random& ra
   const int num_shapes = static_cast<int>(density * picture.cols * picture.rows / mean_area);
   for (int i = 0; i < num_shapes; ++i) {
     const double radius = 1 / std::sqrt(random.Uniform(b2, a2));
-    const cv::Point2d centre(random.Uniform(0, picture.cols), random.Uniform(0, picture.rows));
-    FillBlob(picture, centre, radius, random.Uniform(15, 240), random);
+    const double y = random.Uniform(0, picture.rows), x = random.Uniform(0, picture.cols);
+    FillBlob(picture, {x, y}, radius, random.Uniform(15, 240), random);
   }
 }
 
@@ -172,8 +179,8 @@ void PaintNotices(cv::Mat picture, double texel_m, Random& random) {
       PaintLeaves(sheet, 8, 0.8, random);
     }
     const double angle = random.Normal(0, 0.12), c = std::cos(angle), s = std::sin(angle);
-    const cv::Matx23d map(c, -s, random.Uniform(0, picture.cols) - w / 2.0, s, c,
-                          random.Uniform(0, picture.rows) - h / 2.0);
+    const double y = random.Uniform(0, picture.rows), x = random.Uniform(0, picture.cols);
+    const cv::Matx23d map(c, -s, x - w / 2.0, s, c, y - h / 2.0);
     cv::warpAffine(sheet, placed, map, picture.size());
     cv::warpAffine(cv::Mat(sheet.size(), CV_8UC1, Grey(255)), mask, map, picture.size());
     placed.copyTo(picture, mask > 127);
@@ -193,8 +200,9 @@ void PaintBrick(cv::Mat picture, double texel_m, Random& random) {
           cv::Point(static_cast<int>(x + brick_w - joint), static_cast<int>(y + brick_h - joint)));
       cv::rectangle(picture, brick, Grey(tone + random.Normal(0, 28)), cv::FILLED);
       if (random.Uniform() < 0.35) {  // a chip or a stain
-        FillBlob(picture, {x + random.Uniform() * brick_w, y + random.Uniform() * brick_h},
-                 brick_h * random.Uniform(0.12, 0.4), tone + random.Normal(0, 60), random);
+        const double value = tone + random.Normal(0, 60), radius = brick_h * random.Uniform(0.12, 0.4);
+        const double stain_x = x + random.Uniform() * brick_w, stain_y = y + random.Uniform() * brick_h;
+        FillBlob(picture, {stain_x, stain_y}, radius, value, random);
       }
     }
   }
@@ -218,10 +226,10 @@ void PaintWood(cv::Mat picture, double texel_m, bool vertical, Random& random) {
         plank.setTo(Grey(tone + random.Normal(0, 16)));
         AddNoise(plank, 16, 2, 7, random, 8, 1);
         for (int64_t k = random.UniformInt(0, 3); k > 0; --k) {  // knots
-          const cv::Point2d centre(random.Uniform(0, plank.cols), random.Uniform(0, plank.rows));
+          const double knot_y = random.Uniform(0, plank.rows), knot_x = random.Uniform(0, plank.cols);
           const double radius = random.Uniform(0.006, 0.022) / texel_m;
-          FillBlob(plank, centre, 1.5 * radius, tone - random.Uniform(15, 40), random);
-          FillBlob(plank, centre, 0.8 * radius, tone - random.Uniform(45, 80), random);
+          FillBlob(plank, {knot_x, knot_y}, 1.5 * radius, tone - random.Uniform(15, 40), random);
+          FillBlob(plank, {knot_x, knot_y}, 0.8 * radius, tone - random.Uniform(45, 80), random);
         }
         cv::rectangle(plank, cv::Rect(0, 0, plank.cols, plank.rows), Grey(tone - 55), 1);
       }
@@ -254,8 +262,8 @@ void PaintMaterial(cv::Mat picture, double texel_m, Material material, Random& r
       AddNoise(picture, 128, 4, 6, random);
       const double area_m2 = picture.cols * picture.rows * texel_m * texel_m;
       for (int i = static_cast<int>(area_m2 * 60); i > 0; --i) {
-        FillBlob(picture, {random.Uniform(0, picture.cols), random.Uniform(0, picture.rows)},
-                 random.Uniform(0.008, 0.05) / texel_m, tone + random.Normal(0, 45), random);
+        const double value = tone + random.Normal(0, 45), radius = random.Uniform(0.008, 0.05) / texel_m;
+        FillBlobSomewhere(picture, radius, value, random);
       }
       return;
     }
@@ -264,8 +272,9 @@ void PaintMaterial(cv::Mat picture, double texel_m, Material material, Random& r
   const double area_m2 = picture.cols * picture.rows * texel_m * texel_m;
   const double tone = cv::mean(picture)[0];
   for (int i = static_cast<int>(area_m2 * 18); i > 0; --i) {
-    FillBlob(picture, {random.Uniform(0, picture.cols), random.Uniform(0, picture.rows)},
-             0.006 / texel_m / std::sqrt(random.Uniform(0.02, 1)), tone + random.Normal(0, 30), random);
+    const double value = tone + random.Normal(0, 30);
+    const double radius = 0.006 / texel_m / std::sqrt(random.Uniform(0.02, 1));
+    FillBlobSomewhere(picture, radius, value, random);
   }
 }
 
@@ -322,9 +331,9 @@ cv::Mat PaintFurnitureFace(int width_px, int height_px, double texel_m, Random& 
     const int w = std::min(width_px - 2, static_cast<int>(random.Uniform(0.06, 0.35) / texel_m));
     const int h = std::min(height_px - 2, static_cast<int>(w * random.Uniform(0.5, 1.4)));
     if (w < 16 || h < 16) continue;
-    PaintPoster(picture(cv::Rect(static_cast<int>(random.Uniform() * (width_px - w)),
-                                 static_cast<int>(random.Uniform() * (height_px - h)), w, h)),
-                random);
+    const int y = static_cast<int>(random.Uniform() * (height_px - h));
+    const int x = static_cast<int>(random.Uniform() * (width_px - w));
+    PaintPoster(picture(cv::Rect(x, y, w, h)), random);
   }
   cv::rectangle(picture, cv::Rect(0, 0, width_px, height_px), Grey(45),
                 std::max(1, static_cast<int>(0.01 / texel_m)));
@@ -351,8 +360,8 @@ cv::Mat PaintFloor(const Rect& bounds, const std::vector<Room>& rooms, double te
       floor.setTo(Grey(tone));
       AddNoise(floor, 64, 2, 10, random, 1, 1, 0.3);
       for (int i = static_cast<int>(rect.area() * 14); i > 0; --i) {
-        FillBlob(floor, {random.Uniform(0, floor.cols), random.Uniform(0, floor.rows)},
-                 random.Uniform(0.015, 0.12) / texel_m, tone + random.Normal(0, 40), random);
+        const double value = tone + random.Normal(0, 40), radius = random.Uniform(0.015, 0.12) / texel_m;
+        FillBlobSomewhere(floor, radius, value, random);
       }
     } else {  // tiles
       const double tile = random.Uniform(0.2, 0.4) / texel_m;
@@ -363,8 +372,8 @@ cv::Mat PaintFloor(const Rect& bounds, const std::vector<Room>& rooms, double te
                               cv::Rect(0, 0, floor.cols, floor.rows));
           one.setTo(Grey(tone + random.Normal(0, 14)));
           if (random.Uniform() < 0.6) {
-            FillBlob(one, {random.Uniform(0, one.cols), random.Uniform(0, one.rows)},
-                     random.Uniform(0.05, 0.3) * tile, tone + random.Normal(0, 35), random);
+            const double value = tone + random.Normal(0, 35), radius = random.Uniform(0.05, 0.3) * tile;
+            FillBlobSomewhere(one, radius, value, random);
           }
           cv::rectangle(one, cv::Rect(0, 0, one.cols, one.rows), Grey(tone - 40), 1);
         }
@@ -393,8 +402,8 @@ cv::Mat PaintCeiling(const Rect& bounds, double texel_m, uint64_t seed) {
         for (int row = 4; row + 3 < one.rows; row += 8) one.rowRange(row, row + 3).setTo(Grey(90));  // vent
       } else {
         for (int64_t i = random.UniformInt(0, 3); i > 0; --i) {  // stains, detectors
-          FillBlob(one, {random.Uniform(0, one.cols), random.Uniform(0, one.rows)},
-                   random.Uniform(0.01, 0.06) / texel_m, 205 - random.Uniform(10, 90), random);
+          const double value = 205 - random.Uniform(10, 90), radius = random.Uniform(0.01, 0.06) / texel_m;
+          FillBlobSomewhere(one, radius, value, random);
         }
       }
       cv::rectangle(one, cv::Rect(0, 0, one.cols, one.rows), Grey(165), 1);

@@ -75,8 +75,9 @@ void DrawObstacles(const SimulateWorldsOptions& options, Random* random, WorldPl
   WallIndex walls({plan->perimeter}, 5.0);
   for (int i = 0; i < num_obstacles; ++i) {
     for (int attempt = 0; attempt < kMaxTries; ++attempt) {
-      const Eigen::Vector2d center(random->Uniform(box.min().x(), box.max().x()),
-                                   random->Uniform(box.min().y(), box.max().y()));
+      const double y = random->Uniform(box.min().y(), box.max().y());
+      const double x = random->Uniform(box.min().x(), box.max().x());
+      const Eigen::Vector2d center(x, y);
       const double radius = random->Uniform(options.min_obstacle_radius_m, options.max_obstacle_radius_m);
       const double aspect = random->Uniform(0.5, 1.0);
       const Polygon obstacle = IsRectangular(options.setting)
