@@ -11,6 +11,8 @@ std::vector<const SiftKernels*> UsableSiftKernels() {
       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) {
     usable.push_back(&kSiftAvx512);
   }
+#elif defined(__aarch64__)
+  usable.push_back(&kSiftNeon);
 #endif
   return usable;
 }

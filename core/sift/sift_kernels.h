@@ -101,5 +101,6 @@ struct SiftKernels {
 extern const SiftKernels kSiftPortable;
 extern const SiftKernels kSiftAvx2;
 extern const SiftKernels kSiftAvx512;
+extern const SiftKernels kSiftNeon;
 
 }  // namespace cairn

@@ -1,7 +1,7 @@
 #pragma once
 
 // The source of all kernels of sift_kernels.h.  Before it, CAIRN_SIFT_LANES is the number of floats of a
-// register.
+// register; CAIRN_SIFT_MAX and CAIRN_SIFT_MIN may be instructions for what the compiler does not find.
 
 #include <cstring>
 
@@ -20,8 +20,13 @@ inline Vector Load(const float* p) {
   return v;
 }
 inline void Store(float* p, Vector v) { std::memcpy(p, &v, sizeof(v)); }
+#ifdef CAIRN_SIFT_MAX
+inline Vector Max(Vector a, Vector b) { return CAIRN_SIFT_MAX(a, b); }
+inline Vector Min(Vector a, Vector b) { return CAIRN_SIFT_MIN(a, b); }
+#else
 inline Vector Max(Vector a, Vector b) { return a > b ? a : b; }
 inline Vector Min(Vector a, Vector b) { return a < b ? a : b; }
+#endif
 
 void DoubleRow(const uint8_t* nearer, const uint8_t* other, int cols, float* doubled) {
   // All values are multiples of 1/16 below 2^8: exact.
@@ -288,6 +293,13 @@ struct Samples {
 // The largest float below kSiftCells + 1.
 constexpr float kLastPlace = 4.9999995f;
 
+// 0, 1, ..., one for each lane.
+inline Vector Steps() {
+  Vector steps;
+  for (int lane = 0; lane < kLanes; ++lane) steps[lane] = static_cast<float>(lane);
+  return steps;
+}
+
 // Places of a row's samples; those outside get no weight.
 inline void GatherPlaces(const SiftPatch& patch, int i, const Interval& columns, int at, Samples* samples,
                          Gradients* gradients) {
@@ -295,19 +307,17 @@ inline void GatherPlaces(const SiftPatch& patch, int i, const Interval& columns,
   const float row_sine = static_cast<float>(i) * patch.sine,
               row_cosine = static_cast<float>(i) * patch.cosine;
   const float sine = patch.sine, cosine = patch.cosine;
-  float* __restrict to_columns = samples->columns + at;
-  float* __restrict to_rows = samples->rows + at;
-  float* __restrict weights = gradients->weights + at;
+  const Vector steps = Steps();
+  float* weights = gradients->weights + at;
   const int begin = columns.begin, num = WholeGroups(columns.end - columns.begin);
-  for (int k = 0; k < num; ++k) {
-    const auto j = static_cast<float>(begin + k);
-    const float column = j * cosine - row_sine + kMiddle;
-    const float row = j * sine + row_cosine + kMiddle;
-    const float least_row = row > 0 ? row : 0.0f, least_column = column > 0 ? column : 0.0f;
-    to_rows[k] = least_row < kLastPlace ? least_row : kLastPlace;
-    to_columns[k] = least_column < kLastPlace ? least_column : kLastPlace;
-    const bool inside = (row > 0) & (row < kSiftCells + 1) & (column > 0) & (column < kSiftCells + 1);
-    weights[k] = inside ? weights[k] : 0.0f;
+  for (int k = 0; k < num; k += kLanes) {
+    const Vector j = static_cast<float>(begin + k) + steps;
+    const Vector column = j * cosine - row_sine + kMiddle;
+    const Vector row = j * sine + row_cosine + kMiddle;
+    Store(samples->rows + at + k, Min(Max(row, Vector{}), Vector{} + kLastPlace));
+    Store(samples->columns + at + k, Min(Max(column, Vector{}), Vector{} + kLastPlace));
+    const Mask inside = (row > 0) & (row < kSiftCells + 1) & (column > 0) & (column < kSiftCells + 1);
+    Store(weights + k, inside ? Load(weights + k) : Vector{});
   }
 }
 

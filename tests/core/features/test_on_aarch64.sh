@@ -21,6 +21,7 @@ for file in core/features/best_two_portable.cc core/features/descriptor_matcher.
   compile "$source/$file" -Wall -Wextra -Werror
 done
 sift_flags=(-O3 -fno-math-errno -fno-trapping-math -Wall -Wextra -Werror)
+compile "$source/core/sift/sift_kernels_neon.cc" "${sift_flags[@]}" -fno-predictive-commoning
 for file in core/sift/sift_kernels_portable.cc core/sift/choose_kernels.cc core/sift/gaussian.cc tests/core/sift/wide_kernels.cc \
   tests/core/sift/sift_kernels_test.cc tests/core/sift/gaussian_test.cc; do
   compile "$source/$file" "${sift_flags[@]}"
