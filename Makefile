@@ -102,8 +102,8 @@ compile: program  ## Compile MAP=RECIPE.toml or MAP=maps/NAME; in SHARDS=N parts
 install: whole  ## Install program, library, headers, Python module and manual under PREFIX [/usr/local], in DESTDIR
 	@cmake --install build/$(PRESET) --prefix $(PREFIX)
 
-deb: deps-all  ## Build the Debian packages into build/deb
-	@scripts/build_packages build/deb
+deb: deps-all  ## Build the Debian packages into build/deb; those for another machine with ARCH=arm64
+	@scripts/build_packages build/deb $(ARCH)
 
 sysroot:  ## Unpack Debian's libraries for arm64 into build/sysroot/arm64, for cmake/arm64.cmake
 	@scripts/make_sysroot arm64 build/sysroot/arm64 $(PACKAGES_SYSROOT)

@@ -10,7 +10,7 @@ set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
 set(CAIRN_SYSROOT ${CMAKE_CURRENT_LIST_DIR}/../build/sysroot/arm64 CACHE PATH "Where `make sysroot` unpacked the packages")
 # CMake reads this file again for each of its checks of the compiler, which do not have the cache.
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES CAIRN_SYSROOT)
-file(REAL_PATH "${CAIRN_SYSROOT}" CMAKE_SYSROOT)
+cmake_path(ABSOLUTE_PATH CAIRN_SYSROOT NORMALIZE OUTPUT_VARIABLE CMAKE_SYSROOT)
 if(NOT EXISTS ${CMAKE_SYSROOT}/made)
   message(FATAL_ERROR "${CMAKE_SYSROOT} has no packages of arm64; run `make sysroot`")
 endif()
