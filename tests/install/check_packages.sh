@@ -9,6 +9,7 @@ if [ "$(id -u)" != 0 ]; then
   exit 77
 fi
 
+rm -rf "$folder"  # what an earlier run compiled against other headers, too
 "$sources/scripts/build_packages" "$folder"
 export LC_ALL=C DEBIAN_FRONTEND=noninteractive  # only now: what is compiled depends on the locale, and so ccache's keys
 lintian --allow-root --fail-on warning "$folder"/*.changes
