@@ -94,7 +94,7 @@ Matches ExactMatches(const DescriptorMatrix& descriptors1, const DescriptorMatri
 }
 
 cv::Mat AsBytes(const DescriptorMatrix& descriptors) {
-  return cv::Mat(static_cast<int>(descriptors.rows()), kDescriptorDim, CV_8UC1,
+  return cv::Mat(static_cast<int>(descriptors.rows()), kSiftDescriptorDim, CV_8UC1,
                  const_cast<uint8_t*>(descriptors.data()));
 }
 
@@ -179,7 +179,7 @@ class Table {
       num_products += static_cast<double>(pair.image1->descriptors.rows()) *
                       static_cast<double>(pair.image2->descriptors.rows());
     }
-    giga_per_pair_ = 1e-9 * kDescriptorDim * num_products / static_cast<double>(pairs_.size());
+    giga_per_pair_ = 1e-9 * kSiftDescriptorDim * num_products / static_cast<double>(pairs_.size());
   }
 
   // Runs the matcher on each pair and adds its row.  Whether its matches are those of exact search.
@@ -240,7 +240,8 @@ bool RunKernels(const std::vector<Image>& images, Table* table) {
   for (const MatchKernel kernel : kernels) {
     std::map<const Image*, PackedDescriptors> packed;
     const double start = CpuMs();
-    for (const Image& image : images) packed.emplace(&image, PackedDescriptors(image.descriptors, kernel));
+    for (const Image& image : images)
+      packed.emplace(&image, PackedDescriptors(image.descriptors, {}, kernel));
     const double pack_ms = (CpuMs() - start) / static_cast<double>(images.size());
     const std::string name = fmt::format("cairn, {} (packing: {:.2f} ms an image)", NameOf(kernel), pack_ms);
     is_exact &= table->Run(name, [&](const ImagePair& pair) {

@@ -11,10 +11,10 @@ namespace {
 
 DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(num, kDescriptorDim);
+  DescriptorMatrix descriptors(num, kSiftDescriptorDim);
   for (int i = 0; i < num; ++i) {
     // The mean square of 0 to 78 is 2^18 / 128.
-    for (int d = 0; d < kDescriptorDim; ++d)
+    for (int d = 0; d < kSiftDescriptorDim; ++d)
       descriptors(i, d) = static_cast<uint8_t>(random.UniformInt(0, 78));
   }
   return descriptors;
@@ -28,14 +28,15 @@ bool SkipIfUnsupported(MatchKernel kernel, benchmark::State& state) {
 void BM_FindBestTwo(benchmark::State& state, MatchKernel kernel) {
   if (SkipIfUnsupported(kernel, state)) return;
   const int num = static_cast<int>(state.range(0));
-  const PackedDescriptors descriptors1(RandomDescriptors(num, 1), kernel);
-  const PackedDescriptors descriptors2(RandomDescriptors(num, 2), kernel);
+  const PackedDescriptors descriptors1(RandomDescriptors(num, 1), {}, kernel);
+  const PackedDescriptors descriptors2(RandomDescriptors(num, 2), {}, kernel);
   std::vector<BestTwo> rows, columns;
   for (auto _ : state) {
     FindBestTwo(descriptors1, descriptors2, &rows, &columns);
     benchmark::DoNotOptimize(rows.data());
   }
-  const double num_multiply_adds = 1.0 * num * num * kDescriptorDim * static_cast<double>(state.iterations());
+  const double num_multiply_adds =
+      1.0 * num * num * kSiftDescriptorDim * static_cast<double>(state.iterations());
   state.counters["multiply_adds/s"] = benchmark::Counter(num_multiply_adds, benchmark::Counter::kIsRate);
 }
 
@@ -43,7 +44,7 @@ void BM_Pack(benchmark::State& state, MatchKernel kernel) {
   if (SkipIfUnsupported(kernel, state)) return;
   const DescriptorMatrix descriptors = RandomDescriptors(static_cast<int>(state.range(0)), 1);
   for (auto _ : state) {
-    const PackedDescriptors packed(descriptors, kernel);
+    const PackedDescriptors packed(descriptors, {}, kernel);
     benchmark::DoNotOptimize(packed.size());
   }
   state.SetItemsProcessed(state.range(0) * state.iterations());

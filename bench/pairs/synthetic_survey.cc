@@ -17,15 +17,15 @@ constexpr double kStep_m = 2.0 / kNumStepsPerView;
 // One image's features: `num_features` points of the wall from `first_point` on, ascending.
 Features MakeFeatures(int64_t first_point, int num_features, const Camera& camera) {
   Features features;
-  features.descriptors.resize(num_features, kDescriptorDim);
+  features.descriptors.resize(num_features, kSiftDescriptorDim);
   for (int i = 0; i < num_features; ++i) {
     Random random(static_cast<uint64_t>(first_point + i));
     const double depth = random.Uniform(2, 4);
     const double x = camera.params[2] + camera.params[0] * (2.0 * i / num_features - 1) / depth;
     const double y = random.Uniform(0, camera.height);
     features.keypoints.push_back({static_cast<float>(x), static_cast<float>(y), 2, 0});
-    Eigen::Matrix<double, 1, kDescriptorDim> d;
-    for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 4);
+    Eigen::Matrix<double, 1, kSiftDescriptorDim> d;
+    for (int k = 0; k < kSiftDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 4);
     features.descriptors.row(i) = (d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>();
   }
   return features;

@@ -19,11 +19,11 @@ namespace {
 Features SomeFeatures(const Camera& camera) {
   Random random(1);
   Features features;
-  features.descriptors.resize(60, kDescriptorDim);
+  features.descriptors.resize(60, kSiftDescriptorDim);
   for (int i = 0; i < 60; ++i) {
     features.keypoints.push_back({static_cast<float>(random.Uniform(0, camera.width)),
                                   static_cast<float>(random.Uniform(0, camera.height)), 2, 0});
-    for (int k = 0; k < kDescriptorDim; ++k) {
+    for (int k = 0; k < kSiftDescriptorDim; ++k) {
       features.descriptors(i, k) = static_cast<uint8_t>(random.UniformInt(0, 60));
     }
   }

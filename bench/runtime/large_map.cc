@@ -90,7 +90,7 @@ void AddRoom(int room_number, bool is_new, MapRows* rows) {
 
 // The descriptors of all rooms before any was surveyed again.
 DescriptorMatrix OldDescriptors(int num_rooms) {
-  DescriptorMatrix descriptors(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
+  DescriptorMatrix descriptors(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kSiftDescriptorDim);
   for (int room = 0; room < num_rooms; ++room)
     descriptors.middleRows(room * kLandmarksPerRoom, kLandmarksPerRoom) = MakeRoom(room).descriptors;
   emit_map::QuantizeDescriptorValues(4, &descriptors);
@@ -102,7 +102,7 @@ Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree)
   rows.name = "large";
   rows.writer = "large_map";
   rows.cameras = {MakeRoom(0).camera};
-  rows.descriptors.resize(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
+  rows.descriptors.resize(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kSiftDescriptorDim);
   // New rooms evenly among the others.
   for (int room = 0; room < num_rooms; ++room) {
     const bool is_new = (int64_t{room} + 1) * num_new / num_rooms > int64_t{room} * num_new / num_rooms;
@@ -114,7 +114,7 @@ Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree)
   const Eigen::Index num_training = std::min<Eigen::Index>(all_training.rows(), 200'000);
   NoProgress progress;
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary tree,
-                         GrowVocabulary(all_training.topRows(num_training), all_training.rows(),
+                         GrowVocabulary(all_training.topRows(num_training), {}, all_training.rows(),
                                         {.depth = 5, .min_num_descriptors_to_split = 8}, 0, 0, progress));
   const double landmarks_per_word = std::max(40.0, static_cast<double>(rows.descriptors.rows()) / 65536);
   rows.vocabulary = emit_map::CutVocabulary(tree, rows.descriptors, rows.images,

@@ -43,7 +43,7 @@ constexpr double kDegreesPerCm = 0.2;  // of drift
 struct WallPoint {
   Eigen::Vector3d position, normal;  // the normal looks into the room
   double size_m;
-  Eigen::Matrix<double, 1, kDescriptorDim> descriptor;
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> descriptor;
 };
 
 std::vector<WallPoint> MakeRoom(int room, int num_points) {
@@ -58,7 +58,7 @@ std::vector<WallPoint> MakeRoom(int room, int num_points) {
     point.position = places[wall] + Eigen::Vector3d(room * (kRoomSide_m + 1), 0, 0);
     point.normal = normals[wall];
     point.size_m = kMinSize_m * std::pow(kMaxSize_m / kMinSize_m, random.Uniform());
-    for (int k = 0; k < kDescriptorDim; ++k) point.descriptor[k] = std::pow(random.Uniform(), 4);
+    for (int k = 0; k < kSiftDescriptorDim; ++k) point.descriptor[k] = std::pow(random.Uniform(), 4);
     point.descriptor *= 512 / point.descriptor.norm();
   }
   return points;
@@ -103,9 +103,9 @@ Features SeeRoom(const std::vector<WallPoint>& points, const Pose& cam_from_worl
   }
   Features features;
   features.keypoints = std::move(keypoints);
-  features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+  features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kSiftDescriptorDim);
   for (size_t i = 0; i < seen.size(); ++i) {
-    for (int k = 0; k < kDescriptorDim; ++k) {
+    for (int k = 0; k < kSiftDescriptorDim; ++k) {
       const double value = seen[i]->descriptor[k] + random.Normal(0, kDescriptorNoise);
       features.descriptors(static_cast<Eigen::Index>(i), k) =
           static_cast<uint8_t>(std::clamp(std::round(value), 0.0, 255.0));

@@ -17,7 +17,7 @@ float SquaredDistance(const std::vector<float>& a, const std::vector<float>& b) 
 }
 
 std::vector<float> ToFloats(const uint8_t* descriptor) {
-  return std::vector<float>(descriptor, descriptor + kDescriptorDim);
+  return std::vector<float>(descriptor, descriptor + kSiftDescriptorDim);
 }
 
 // k-means++
@@ -77,19 +77,19 @@ void BagOfWordsPeer::Split(Node* node, const std::vector<std::vector<float>>& tr
   std::vector<int> nearest(members.size(), -1);
   for (int iteration = 0; iteration < options.max_num_iterations; ++iteration) {
     bool is_changed = false;
-    std::vector<std::vector<float>> sums(centres.size(), std::vector<float>(kDescriptorDim, 0.f));
+    std::vector<std::vector<float>> sums(centres.size(), std::vector<float>(kSiftDescriptorDim, 0.f));
     std::vector<int> counts(centres.size(), 0);
     for (size_t i = 0; i < members.size(); ++i) {
       const int centre = Nearest(centres, training[members[i]]);
       is_changed |= centre != nearest[i];
       nearest[i] = centre;
       ++counts[centre];
-      for (int d = 0; d < kDescriptorDim; ++d) sums[centre][d] += training[members[i]][d];
+      for (int d = 0; d < kSiftDescriptorDim; ++d) sums[centre][d] += training[members[i]][d];
     }
     if (!is_changed) break;
     for (size_t k = 0; k < centres.size(); ++k) {
       if (counts[k] == 0) continue;
-      for (int d = 0; d < kDescriptorDim; ++d) centres[k][d] = sums[k][d] / static_cast<float>(counts[k]);
+      for (int d = 0; d < kSiftDescriptorDim; ++d) centres[k][d] = sums[k][d] / static_cast<float>(counts[k]);
     }
   }
   for (size_t k = 0; k < centres.size(); ++k) {

@@ -9,7 +9,7 @@
 namespace cairn {
 namespace {
 
-using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, kDescriptorDim, Eigen::RowMajor>;
+using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, kSiftDescriptorDim, Eigen::RowMajor>;
 
 FloatMatrix ToFloats(const DescriptorMatrix& descriptors) { return descriptors.cast<float>(); }
 
@@ -25,20 +25,20 @@ void FaissPeer::Train(const DescriptorMatrix& training, int num_words, int num_i
   faiss::ClusteringParameters parameters;
   parameters.niter = num_iterations;
   parameters.min_points_per_centroid = 1;
-  faiss::Clustering clustering(kDescriptorDim, num_words, parameters);
-  faiss::IndexFlatL2 assign(kDescriptorDim);
+  faiss::Clustering clustering(kSiftDescriptorDim, num_words, parameters);
+  faiss::IndexFlatL2 assign(kSiftDescriptorDim);
   clustering.train(floats.rows(), floats.data(), assign);
   if (is_graph) {
-    auto graph = std::make_unique<faiss::IndexHNSWFlat>(kDescriptorDim, 32);
+    auto graph = std::make_unique<faiss::IndexHNSWFlat>(kSiftDescriptorDim, 32);
     graph->hnsw.efSearch = 32;
     quantizer_ = std::move(graph);
   } else {
-    quantizer_ = std::make_unique<faiss::IndexFlatL2>(kDescriptorDim);
+    quantizer_ = std::make_unique<faiss::IndexFlatL2>(kSiftDescriptorDim);
   }
   quantizer_->add(num_words, clustering.centroids.data());
   auto inverted_file = std::make_unique<faiss::IndexIVFScalarQuantizer>(
-      quantizer_.get(), kDescriptorDim, num_words, faiss::ScalarQuantizer::QT_8bit_direct, faiss::METRIC_L2,
-      false);
+      quantizer_.get(), kSiftDescriptorDim, num_words, faiss::ScalarQuantizer::QT_8bit_direct,
+      faiss::METRIC_L2, false);
   inverted_file->train(floats.rows(), floats.data());
   inverted_file_ = std::move(inverted_file);
 }

@@ -77,7 +77,7 @@ Features Draw(const Features& features, int count, uint64_t seed) {
   std::vector<int64_t> rows(num_all);
   std::iota(rows.begin(), rows.end(), 0);
   Features drawn;
-  drawn.descriptors.resize(count, kDescriptorDim);
+  drawn.descriptors.resize(count, kSiftDescriptorDim);
   for (int i = 0; i < count; ++i) {
     std::swap(rows[i], rows[random.UniformInt(i, num_all - 1)]);
     drawn.keypoints.push_back(features.keypoints[rows[i]]);
@@ -150,7 +150,7 @@ class Retrieval {
       options.max_document_ratio = stop_ratio;
       NoProgress progress;
       CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
-                             build_vocabulary::BuildVocabulary(documents, options, arguments_.seed,
+                             build_vocabulary::BuildVocabulary(documents, {}, options, arguments_.seed,
                                                                arguments_.num_threads, progress));
       for (const int count : arguments_.counts) {
         for (const int num_verified : arguments_.num_verified) {

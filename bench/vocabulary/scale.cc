@@ -133,7 +133,8 @@ Vocabulary RunTree(const Survey& survey, const build_vocabulary::BuildVocabulary
                    int num_threads, const std::string& name) {
   Times times;
   const double start = CpuSeconds(), start_elapsed = Now();
-  Vocabulary vocabulary = *build_vocabulary::BuildVocabulary(survey.images, options, 0, num_threads, times);
+  Vocabulary vocabulary =
+      *build_vocabulary::BuildVocabulary(survey.images, {}, options, 0, num_threads, times);
   const double end = CpuSeconds();
   Row row{.method = name, .num_words = vocabulary.num_words()};
   row.elapsed_s = Now() - start_elapsed;
@@ -151,7 +152,7 @@ DescriptorMatrix Sample(const Survey& survey, int64_t count) {
   int64_t total = 0;
   for (const build_vocabulary::ImageDescriptors& image : survey.images) total += image.descriptors.rows();
   const int64_t step = std::max<int64_t>(1, total / count);
-  DescriptorMatrix sample((total + step - 1) / step, kDescriptorDim);
+  DescriptorMatrix sample((total + step - 1) / step, kSiftDescriptorDim);
   int64_t first = 0;
   for (const build_vocabulary::ImageDescriptors& image : survey.images) {
     const int64_t num_rows = image.descriptors.rows();

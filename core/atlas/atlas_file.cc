@@ -162,7 +162,7 @@ bool ReadPayload(std::string_view payload, AtlasRows* atlas) {
   atlas->epoch = reader.Varint();
   for (uint8_t& coefficient : atlas->code_book.coefficients) {
     coefficient = reader.UInt8();
-    if (coefficient >= kDescriptorDim) reader.Fail();
+    if (coefficient >= kSiftDescriptorDim) reader.Fail();
   }
   for (int16_t& median : atlas->code_book.medians) {
     const int64_t value = UnZigZag(reader.Varint());

@@ -18,12 +18,13 @@ CodeBook LearnCodeBook(const DescriptorMatrix& descriptors) {
   CodeBook book;
   const Eigen::Index num = descriptors.rows();
   if (num == 0) return book;
-  std::vector<std::vector<int16_t>> values(kDescriptorDim, std::vector<int16_t>(static_cast<size_t>(num)));
+  std::vector<std::vector<int16_t>> values(kSiftDescriptorDim,
+                                           std::vector<int16_t>(static_cast<size_t>(num)));
   for (Eigen::Index row = 0; row < num; ++row) {
-    const TransformLevels levels = LevelsOf(descriptors.data() + row * kDescriptorDim, kUnitSteps);
+    const TransformLevels levels = LevelsOf(descriptors.data() + row * kSiftDescriptorDim, kUnitSteps);
     for (size_t c = 0; c < levels.size(); ++c) values[c][static_cast<size_t>(row)] = levels[c];
   }
-  std::array<int64_t, kDescriptorDim> spread;  // sum of squared distances from the median
+  std::array<int64_t, kSiftDescriptorDim> spread;  // sum of squared distances from the median
   for (size_t c = 0; c < values.size(); ++c) {
     const auto middle = values[c].begin() + num / 2;
     std::nth_element(values[c].begin(), middle, values[c].end());
@@ -33,7 +34,7 @@ CodeBook LearnCodeBook(const DescriptorMatrix& descriptors) {
         [&](int64_t sum, int16_t value) { return sum + (value - median) * (value - median); });
     std::swap(*middle, values[c].front());
   }
-  std::array<uint8_t, kDescriptorDim> order;
+  std::array<uint8_t, kSiftDescriptorDim> order;
   std::iota(order.begin(), order.end(), uint8_t{0});
   std::stable_sort(order.begin(), order.end(), [&](uint8_t a, uint8_t b) { return spread[a] > spread[b]; });
   for (size_t bit = 0; bit < kNumCodeBits; ++bit) {

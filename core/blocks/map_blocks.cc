@@ -244,7 +244,7 @@ std::string EncodeVocabularyTree(const Vocabulary& vocabulary) {
   writer.Varint(static_cast<uint64_t>(vocabulary.depth));
   for (const VocabularyNode& node : vocabulary.nodes) writer.Varint(static_cast<uint64_t>(node.num_children));
   if (vocabulary.nodes.size() > 1) {
-    writer.Bytes(vocabulary.centres.row(1).data(), (vocabulary.nodes.size() - 1) * kDescriptorDim);
+    writer.Bytes(vocabulary.centres.row(1).data(), (vocabulary.nodes.size() - 1) * vocabulary.centres.cols());
   }
   return writer.Take();
 }
@@ -253,6 +253,7 @@ Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry
                                         const MapDirectory& directory, const std::string& what) {
   BlobReader reader(bytes);
   Vocabulary vocabulary;
+  vocabulary.kind = directory.descriptor_kind();
   const uint64_t branching = reader.Varint();
   const uint64_t depth = reader.Varint();
   if (branching > 1000 || depth > 1000)
@@ -267,7 +268,7 @@ Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry
     }
     node.num_children = static_cast<int32_t>(num_children);
   }
-  const std::string_view centres = reader.Bytes((size_t{entry.count} - 1) * kDescriptorDim);
+  const std::string_view centres = reader.Bytes((size_t{entry.count} - 1) * vocabulary.kind.num_values);
   if (!reader.Finished()) return Corrupt(what, "{} bytes do not fit {} nodes", bytes.size(), entry.count);
   if (Status status = NumberVocabularyNodes(&vocabulary); !status.ok()) {
     return Corrupt(what, "{}", status.error().message);
@@ -276,7 +277,7 @@ Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry
     return Corrupt(what, "{} leaves, but {} words", vocabulary.num_words(),
                    directory.Count(BlockKind::kWords));
   }
-  vocabulary.centres = DescriptorMatrix::Zero(entry.count, kDescriptorDim);
+  vocabulary.centres = DescriptorMatrix::Zero(entry.count, vocabulary.kind.num_values);
   if (!centres.empty()) std::memcpy(vocabulary.centres.row(1).data(), centres.data(), centres.size());
   return vocabulary;
 }

@@ -72,6 +72,9 @@ class MapDirectory {
   int64_t Count(BlockKind kind) const { return count_[static_cast<int>(kind)]; }
   // Ordinal, among those of its kind, of the block with an element.  REQUIRES: element in [0, Count(kind))
   int64_t OrdinalOf(BlockKind kind, int64_t element) const;
+  // Of the map, which its head says and its blocks do not.
+  const DescriptorKind& descriptor_kind() const { return descriptor_kind_; }
+  void set_descriptor_kind(DescriptorKind kind) { descriptor_kind_ = std::move(kind); }
 
   std::string Encode() const;
   // `max_num_bytes`: what the blocks can take together.  Errors: Corrupt (lengths, order, counts that the
@@ -82,6 +85,7 @@ class MapDirectory {
   std::vector<BlockEntry> blocks_;
   std::array<std::vector<int64_t>, kNumBlockKinds> of_kind_;
   std::array<int64_t, kNumBlockKinds> count_ = {};
+  DescriptorKind descriptor_kind_;
 };
 
 // Landmarks first, first + 1, ... with which regions have them, and where to look for images that see them.

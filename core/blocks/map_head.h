@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/camera/camera.h"
 #include "core/capture/capture_frame.h"
+#include "core/features/features.h"
 #include "core/geometry/pose.h"
 
 namespace cairn {
@@ -34,6 +35,8 @@ struct MapHead {
   // Which classes are landmarks: those that regions keep ("regions"), the fewest with which images are
   // localized as with all ("fewest"), or "all".
   std::string landmark_choice = "regions";
+  // What the landmarks' descriptors are: queries of another kind are refused.
+  DescriptorKind descriptor_kind;
   // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
   std::string documents = "all";
   // How the regions were made; kPromiseAlgorithm: of the nodes whose promises the same landmarks keep, and k,

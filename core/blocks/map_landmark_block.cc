@@ -39,7 +39,6 @@ void WriteDescriptors(const DescriptorMatrix& descriptors, BlobWriter* writer) {
   writer->UInt8(static_cast<uint8_t>(levels.bits));
   writer->UInt8(static_cast<uint8_t>(levels.values.size() - 1));
   writer->Bytes(levels.values.data(), levels.values.size());
-  // 128 values of any number of bits are whole bytes.
   uint32_t pending = 0;
   int num_pending = 0;
   for (Eigen::Index i = 0; i < descriptors.size(); ++i) {
@@ -48,18 +47,19 @@ void WriteDescriptors(const DescriptorMatrix& descriptors, BlobWriter* writer) {
       writer->UInt8(static_cast<uint8_t>(pending));
     }
   }
+  if (num_pending > 0) writer->UInt8(static_cast<uint8_t>(pending));  // not of SIFT's 128 values
 }
 
-bool ReadDescriptors(BlobReader* reader, int64_t count, DescriptorMatrix* descriptors) {
+bool ReadDescriptors(BlobReader* reader, int64_t count, int num_values, DescriptorMatrix* descriptors) {
   const int bits = reader->UInt8();
   const size_t num_levels = size_t{reader->UInt8()} + 1;
   const std::string_view levels = reader->Bytes(num_levels);
   if (!reader->ok() || bits < 1 || bits > 8 || num_levels > size_t{1} << bits) return false;
-  const std::string_view bytes = reader->Bytes(static_cast<size_t>(count) * kDescriptorDim * bits / 8);
+  const std::string_view bytes = reader->Bytes((static_cast<size_t>(count) * num_values * bits + 7) / 8);
   if (!reader->ok()) return false;
   std::array<uint8_t, 256> value = {};  // of a code without a level: 0
   std::memcpy(value.data(), levels.data(), levels.size());
-  descriptors->resize(count, kDescriptorDim);
+  descriptors->resize(count, num_values);
   const uint32_t mask = (1u << bits) - 1;
   uint32_t pending = 0;
   int num_pending = 0;
@@ -188,6 +188,7 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   }
   if (entry.is_packed) {
     PackedLandmarks packed;
+    if (!directory.descriptor_kind().is_sift()) return corrupt("the packed descriptors");
     if (!reader.ok() || !UnpackLandmarks(reader.Bytes(reader.num_left()), entry.count, &packed))
       return corrupt("the packed numbers");
     block.landmarks = std::move(packed.landmarks);
@@ -213,7 +214,8 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   for (MapLandmark& landmark : block.landmarks) landmark.scale_m = DecodeSize(reader.UInt8());
   for (MapLandmark& landmark : block.landmarks) landmark.covariance = DecodeCovariance(reader.UInt64());
   if (!ReadPositions(&reader, &block.landmarks)) return corrupt("the positions");
-  if (!ReadDescriptors(&reader, entry.count, &block.descriptors)) return corrupt("the descriptors");
+  if (!ReadDescriptors(&reader, entry.count, directory.descriptor_kind().num_values, &block.descriptors))
+    return corrupt("the descriptors");
   if (!reader.Finished()) return corrupt("the bytes");
   return block;
 }

@@ -245,6 +245,16 @@ Status CheckMapRows(const MapRows& rows) {
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
     return Invalid("{} landmarks, but {} descriptors", rows.landmarks.size(), rows.descriptors.rows());
   }
+  const DescriptorKind& kind = rows.descriptor_kind;
+  if (!rows.landmarks.empty() && rows.descriptors.cols() != kind.num_values)
+    return Invalid("descriptors of {} values, expected {}", rows.descriptors.cols(), kind.num_values);
+  const Vocabulary& words = rows.vocabulary;
+  if (!words.nodes.empty() && (words.kind != kind || words.centres.cols() != kind.num_values)) {
+    return Invalid("words of descriptors of the kind '{}', {} values, but landmarks of the kind '{}'",
+                   ToString(words.kind), words.centres.cols(), ToString(kind));
+  }
+  if (rows.descriptor_code && !kind.is_sift())
+    return Invalid("a code of SIFT's descriptors for those of the kind '{}'", ToString(kind));
   for (size_t i = 0; i < rows.landmarks.size(); ++i) {
     const MapLandmark& landmark = rows.landmarks[i];
     if (!landmark.position.allFinite() || !landmark.covariance.allFinite() || !(landmark.scale_m >= 0) ||

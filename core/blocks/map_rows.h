@@ -93,6 +93,9 @@ struct MapRows : MapHead {
 
 inline constexpr int kMapVersionMajor = 2;
 inline constexpr int kMapVersionMinor = 7;
+// The major version that maps with other descriptors than SIFT's state, so that programs which know those
+// alone refuse them; all else is as in kMapVersionMajor.
+inline constexpr int kMapVersionOfKinds = 3;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

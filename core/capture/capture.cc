@@ -245,6 +245,48 @@ Status AddUnposed(const std::string& name, int session, FlatFolderCameras* camer
   return cameras->Add(name, session, *image);
 }
 
+// Where the features of images without a file are, and of those that a database replaces.
+Status FindFeatures(const std::vector<CaptureImage>& images, CaptureFeatures* features, Capture* capture) {
+  for (const CaptureImage& image : images) {
+    std::error_code error;
+    if (capture->features.contains(image.name)) continue;
+    if (!features->ReplacesFiles(image.name) && fs::exists(capture->ImagePath(image), error)) continue;
+    CAIRN_ASSIGN_OR_RETURN(const FeaturesRow* row, features->Find(image.name));
+    if (row != nullptr) capture->features.emplace(image.name, *row);
+  }
+  return Ok();
+}
+
+// Moves images without file and features, or with a camera that cameras.txt lacks, to the rejects.
+void RejectUnusable(CaptureFeatures* features, Capture* capture, std::vector<CaptureImage>* images) {
+  std::erase_if(*images, [&](const CaptureImage& image) {
+    std::string reason;
+    std::error_code error;
+    const std::string path = capture->ImagePath(image);
+    const std::string database = features->PathFor(image.name);
+    if (capture->FeaturesOf(image) != nullptr) {
+      if (capture->cameras.count(image.camera_id) == 0)
+        reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
+    } else if (features->ReplacesFiles(image.name)) {
+      reason =
+          fmt::format("{}: no such image in it, and it has the features of this capture's images", database);
+    } else if (!fs::exists(path, error) && !database.empty()) {
+      reason = fmt::format("{}: no such file, and no such image in {}", path, database);
+    } else if (!fs::exists(path, error)) {
+      reason = fs::is_symlink(fs::symlink_status(path, error))
+                   ? fmt::format("{}: a link to a file that does not exist", path)
+                   : fmt::format("{}: no such file, but the image list names it", path);
+    } else if (!fs::is_regular_file(path, error)) {
+      reason = fmt::format("{}: not a file, but the image list names it", path);
+    } else if (capture->cameras.count(image.camera_id) == 0) {
+      reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
+    }
+    if (reason.empty()) return false;
+    capture->rejects.push_back({image.name, reason});
+    return true;
+  });
+}
+
 // The images that a database of features has, where no file is of its session ("": of any): they are the
 // session's.
 Status AddUnposedFeatures(const std::vector<std::string>& names, const std::vector<std::string>& sessions,
@@ -295,8 +337,10 @@ Status ReadFlatFolder(Capture* capture) {
   CAIRN_RETURN_IF_ERROR(AddUnposedFeatures(names, sessions, "", &features, &cameras));
   for (const std::string& session : sessions)
     CAIRN_RETURN_IF_ERROR(AddUnposedFeatures(names, sessions, session, &features, &cameras));
+  CAIRN_RETURN_IF_ERROR(FindFeatures(capture->images, &features, capture));
   SortByName(&capture->images);
   cameras.Finish();
+  RejectUnusable(&features, capture, &capture->images);
   return Ok();
 }
 
@@ -376,44 +420,6 @@ Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* fe
   return Ok();
 }
 
-// Where the features of images without a file are.
-Status FindFeatures(const std::vector<CaptureImage>& images, CaptureFeatures* features, Capture* capture) {
-  for (const CaptureImage& image : images) {
-    std::error_code error;
-    if (fs::exists(capture->ImagePath(image), error) || capture->features.contains(image.name)) continue;
-    CAIRN_ASSIGN_OR_RETURN(const FeaturesRow* row, features->Find(image.name));
-    if (row != nullptr) capture->features.emplace(image.name, *row);
-  }
-  return Ok();
-}
-
-// Moves images without file and features, or with a camera that cameras.txt lacks, to the rejects.
-void RejectUnusable(const CaptureFeatures& features, Capture* capture, std::vector<CaptureImage>* images) {
-  std::erase_if(*images, [&](const CaptureImage& image) {
-    std::string reason;
-    std::error_code error;
-    const std::string path = capture->ImagePath(image);
-    const std::string database = features.PathFor(image.name);
-    if (capture->FeaturesOf(image) != nullptr) {
-      if (capture->cameras.count(image.camera_id) == 0)
-        reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
-    } else if (!fs::exists(path, error) && !database.empty()) {
-      reason = fmt::format("{}: no such file, and no such image in {}", path, database);
-    } else if (!fs::exists(path, error)) {
-      reason = fs::is_symlink(fs::symlink_status(path, error))
-                   ? fmt::format("{}: a link to a file that does not exist", path)
-                   : fmt::format("{}: no such file, but the image list names it", path);
-    } else if (!fs::is_regular_file(path, error)) {
-      reason = fmt::format("{}: not a file, but the image list names it", path);
-    } else if (capture->cameras.count(image.camera_id) == 0) {
-      reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
-    }
-    if (reason.empty()) return false;
-    capture->rejects.push_back({image.name, reason});
-    return true;
-  });
-}
-
 // The lists of a capture with poses.
 Status ReadLists(Capture* capture) {
   const std::string& root = capture->root;
@@ -443,8 +449,8 @@ Status ReadLists(Capture* capture) {
     capture->warnings.push_back(
         fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture->images_folder, name));
   }
-  RejectUnusable(features, capture, &capture->images);
-  RejectUnusable(features, capture, &capture->queries);
+  RejectUnusable(&features, capture, &capture->images);
+  RejectUnusable(&features, capture, &capture->queries);
   return Ok();
 }
 

@@ -44,11 +44,12 @@ struct Capture {
   std::vector<std::string> registered;
   // Of those of their images that are posed in a frame of the session's own: cam_from_session, by name.
   std::map<std::string, Pose> own_poses;
-  // Of images (and queries) that have no file: where their features are, by name (capture_features.h).
+  // Of images (and queries) that have no file, or that a database replaces: where their features are, by name
+  // (capture_features.h).
   std::map<std::string, FeaturesRow> features;
 
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
-  // Null: the image has a file.
+  // Null: they are to be found in its file.
   const FeaturesRow* FeaturesOf(const CaptureImage& image) const {
     const auto found = features.find(image.name);
     return found == features.end() ? nullptr : &found->second;

@@ -7,6 +7,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/colmap_database.h"
 #include "core/colmap/cut_database.h"
+#include "core/features/descriptor_kind_table.h"
 
 namespace cairn {
 namespace {
@@ -48,7 +49,8 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
         return MakeError(ErrorCode::kCorrupt, "{}: image '{}' has camera {}, which is not in it", path,
                          image.name, image.camera_id);
       }
-      rows.emplace(prefix + image.name, FeaturesRow{path, image.image_id, camera->second});
+      rows.emplace(prefix + image.name,
+                   FeaturesRow{path, image.image_id, camera->second, HasDescriptorKind(database)});
     }
     if (!HasTable(database, "cairn_landmark_images")) return rows;
     std::set<int64_t> of_landmarks;
@@ -72,7 +74,9 @@ Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera, bo
     }
     Features features;
     CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, row.image_id));
-    CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, row.image_id));
+    CAIRN_ASSIGN_OR_RETURN(features.kind, ReadDescriptorKind(database, row.path));
+    CAIRN_ASSIGN_OR_RETURN(features.descriptors,
+                           ReadDatabaseDescriptors(database, row.image_id, features.kind));
     if (static_cast<Eigen::Index>(features.keypoints.size()) != features.descriptors.rows()) {
       return MakeError(ErrorCode::kCorrupt, "{}: image {}: {} keypoints and {} descriptors", row.path,
                        row.image_id, features.keypoints.size(), features.descriptors.rows());
@@ -87,7 +91,7 @@ Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera, bo
                          "{}: image {}: keypoint {} at ({:g}, {:g}) is not in {} x {} px", row.path,
                          row.image_id, i, keypoint.x, keypoint.y, camera.width, camera.height);
       }
-      if (!(keypoint.scale > 0)) {
+      if (!(keypoint.scale > 0 || (keypoint.scale == 0 && !features.kind.is_sift()))) {
         return MakeError(ErrorCode::kCorrupt, "{}: image {}: keypoint {} has the scale {:g}", row.path,
                          row.image_id, i, keypoint.scale);
       }
@@ -131,6 +135,11 @@ Result<const FeaturesRow*> CaptureFeatures::Find(const std::string& name) {
   CAIRN_ASSIGN_OR_RETURN(const auto* rows, List(SessionOf(name)));
   const auto row = rows->find(name);
   return row == rows->end() ? nullptr : &row->second;
+}
+
+bool CaptureFeatures::ReplacesFiles(const std::string& name) {
+  const auto rows = List(SessionOf(name));
+  return rows.ok() && !(*rows)->empty() && (*rows)->begin()->second.replaces_file;
 }
 
 Result<Features> ReadCaptureFeatures(const FeaturesRow& row, const Camera& camera) {

@@ -24,6 +24,8 @@ struct FeaturesRow {
   std::string path;  // of the database
   ImageId image_id = 0;
   Camera camera;  // with which they were found
+  // Its database states the kind of its descriptors: they stand for the image, whether it has a file or not.
+  bool replaces_file = false;
   // They are landmarks of a map, seen where it says: no robot's image looks like this, and no map is tried on
   // it.
   bool are_landmarks = false;
@@ -42,6 +44,9 @@ class CaptureFeatures {
   std::string PathFor(const std::string& name) const;
   // The image's row there; null: it has none.  Errors: as of List.
   Result<const FeaturesRow*> Find(const std::string& name);
+  // Whether the database that an image is looked for in states the kind of its descriptors: its features then
+  // stand for images, whether they have a file or not.  A database that cannot be read does not.
+  bool ReplacesFiles(const std::string& name);
   // All images of the capture's database, or of a session's ("": of none), as the capture names them; empty
   // where there is none.  Errors: those of OpenColmapDatabase and its readers; Corrupt (an image without a
   // camera).

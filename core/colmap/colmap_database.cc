@@ -191,31 +191,34 @@ Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, 
   return keypoints;
 }
 
-Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id) {
+Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,
+                                                 const DescriptorKind& kind) {
   // COLMAP 4.0 says what extracted them: 0 is SIFT.
   const bool has_type = HasColumn(database, "descriptors", "type");
   SQLite::Statement query(database,
                           fmt::format("SELECT rows, cols, data, {} FROM descriptors WHERE image_id = ?",
                                       has_type ? "type" : "0"));
   query.bind(1, image_id);
-  DescriptorMatrix descriptors(0, kDescriptorDim);
+  DescriptorMatrix descriptors(0, kind.num_values);
   if (!query.executeStep()) return descriptors;
   RowReader row(query);
   const int64_t type = row.Integer(3, INT32_MIN, INT32_MAX);
   const int64_t columns = row.Integer(1, INT32_MIN, INT32_MAX);
   const int64_t rows = row.Integer(0, 0, kMaxKeypoints);
-  if (row.ok() && rows > 0 && (type != 0 || columns == kDescriptorDim * int64_t{sizeof(float)})) {
-    return MakeError(ErrorCode::kUnsupported,
-                     "{}: table descriptors, row {}: {} bytes a descriptor{}: not SIFT's 128 bytes; learned "
-                     "and float descriptors are not read; extract SIFT features",
-                     DatabasePath(database), image_id, columns,
-                     type != 0 ? fmt::format(", of extractor type {}", type) : "");
+  if (row.ok() && rows > 0 && kind.is_sift() &&
+      (type != 0 || columns == kSiftDescriptorDim * int64_t{sizeof(float)})) {
+    return MakeError(
+        ErrorCode::kUnsupported,
+        "{}: table descriptors, row {}: {} bytes a descriptor{}: not SIFT's 128 bytes; say what they "
+        "are: `cairn features DATABASE CAPTURE --descriptors float` (or binary)",
+        DatabasePath(database), image_id, columns,
+        type != 0 ? fmt::format(", of extractor type {}", type) : "");
   }
-  if (row.ok() && rows > 0 && columns != kDescriptorDim)
-    row.Fail(fmt::format("{} columns, expected {}", columns, kDescriptorDim));
-  const std::string_view blob = row.Matrix(2, kDescriptorDim, 1);
+  if (row.ok() && rows > 0 && columns != kind.num_values)
+    row.Fail(fmt::format("{} columns, expected {}", columns, kind.num_values));
+  const std::string_view blob = row.Matrix(2, kind.num_values, 1);
   if (!row.ok()) return BadRow(database, "descriptors", image_id, row.problem());
-  descriptors.resize(rows, kDescriptorDim);
+  descriptors.resize(rows, kind.num_values);
   if (rows > 0) std::memcpy(descriptors.data(), blob.data(), blob.size());
   return descriptors;
 }
@@ -323,10 +326,11 @@ void WriteDatabaseFeatures(SQLite::Database& database, ImageId image_id, const F
   keypoints.bind(2, rows);
   BindBlob(keypoints, 3, features.keypoints.data(), rows * sizeof(Keypoint));
   keypoints.exec();
-  SQLite::Statement descriptors(database, "INSERT INTO descriptors VALUES (?, ?, 128, ?)");
+  SQLite::Statement descriptors(database, "INSERT INTO descriptors VALUES (?, ?, ?, ?)");
   descriptors.bind(1, image_id);
   descriptors.bind(2, rows);
-  BindBlob(descriptors, 3, features.descriptors.data(), rows * kDescriptorDim);
+  descriptors.bind(3, static_cast<int64_t>(features.descriptors.cols()));
+  BindBlob(descriptors, 4, features.descriptors.data(), features.descriptors.size());
   descriptors.exec();
 }
 

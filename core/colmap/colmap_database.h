@@ -72,7 +72,9 @@ void CopyColmapDatabase(SQLite::Database& source, const std::string& copy_path);
 Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& database);
 Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database);  // ascending image_id
 Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
-Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id);
+// Of this kind, which the database says (ReadDescriptorKind).
+Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,
+                                                 const DescriptorKind& kind = {});
 // All pairs with at least `min_num_inliers` inliers, ascending pair_id.
 Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
                                                                    int min_num_inliers);

@@ -110,6 +110,7 @@ void WriteCode(const TransformCode& code, const TransformCode& of_first, BlobWri
 }
 
 bool ReadLandmarks(const MapRows& from, const Renumbering& renumbering, BlobReader* reader, MapRows* rows) {
+  if (!from.descriptor_kind.is_sift()) return false;
   TransformCode code = from.descriptor_code.value_or(TransformCode());
   const uint8_t is_own_code = reader->UInt8();
   if (is_own_code > 1 || (is_own_code == 0 && !from.descriptor_code)) return false;
@@ -126,7 +127,7 @@ bool ReadLandmarks(const MapRows& from, const Renumbering& renumbering, BlobRead
     return false;
   rows->descriptor_code = code;
   const auto num = static_cast<Eigen::Index>(renumbering.landmarks.size());
-  rows->descriptors.resize(num, kDescriptorDim);
+  rows->descriptors.resize(num, from.descriptors.cols());
   Eigen::Index next_new = 0;
   for (Eigen::Index i = 0; i < num; ++i) {
     const int32_t origin = renumbering.landmarks[i];
@@ -145,7 +146,8 @@ bool ReadLandmarks(const MapRows& from, const Renumbering& renumbering, BlobRead
 
 Result<std::optional<std::string>> MakeRowDelta(const MapRows& from, const MapRows& to,
                                                 const std::string& what) {
-  if (!from.descriptor_code || !to.descriptor_code) return std::optional<std::string>();
+  if (!from.descriptor_code || !to.descriptor_code || !from.descriptor_kind.is_sift())
+    return std::optional<std::string>();
   const Renumbering same = FindSame(from, to);
   MapRows old = Renumbered(from, same);
   old.regions.resize(to.regions.size());

@@ -10,7 +10,7 @@ namespace cairn {
 // All dot products of a block of rows with a block of columns, and the best two of each row and of
 // each column.
 //
-// Layout of both sides: descriptors in groups of `lanes`; a group is 32 chunks x lanes words, a word being
+// Layout of both sides: descriptors in groups of `lanes`; a group is num_chunks x lanes words, a word being
 // four consecutive 8-bit values of one (permuted) descriptor.  So a vector load yields one chunk of `lanes`
 // columns, and the same words, broadcast one by one, serve as rows.
 //
@@ -19,11 +19,16 @@ namespace cairn {
 // caller makes sure that indices stay below 2^index_bits - 1 and dot products below 2^(key bits
 // - index_bits).
 struct BestTwoSweep {
-  const uint32_t* rows = nullptr;     // num_row_groups x 32 x lanes, values less the kernel's row offset
-  const uint32_t* columns = nullptr;  // num_column_groups x 32 x lanes
+  const uint32_t* rows = nullptr;  // num_row_groups x num_chunks x lanes, values less the kernel's row offset
+  const uint32_t* columns = nullptr;  // num_column_groups x num_chunks x lanes
   // What a kernel with a row offset starts its sums from, to compensate for the offset: num_column_groups x
   // bias words x lanes.
   const uint32_t* bias = nullptr;
+  // Subtracted from the products of a row, and of a column: what makes them products of values less the
+  // space's offset, and none negative.  Null where the offset is 0 and there are kNumSiftChunks chunks.
+  const uint32_t* row_terms = nullptr;     // rows
+  const uint32_t* column_terms = nullptr;  // num_column_groups x lanes
+  int num_chunks = 0;
   int num_row_groups = 0;
   int num_column_groups = 0;
   int index_bits = 0;
@@ -41,7 +46,8 @@ struct BestTwoKernel {
   int key_bits;    // of a 32-bit key that it can compare
 };
 
-// Chunks whose products the kernels for small values sum in 16 bits.
+inline constexpr int kNumSiftChunks = 32;
+// Chunks whose products the kernels for small values, of SIFT alone, sum in 16 bits.
 inline constexpr int kBestTwoPartialChunks = 8;
 
 // For descriptors for which every sum of 16 products in one 16-bit lane is exact: see FitsIn16Bits.

@@ -16,7 +16,15 @@
 
 namespace cairn::best_two_internal {
 
-inline constexpr int kNumChunks = 32;
+// How many chunks a descriptor has: a constant for SIFT, since it makes the addresses of columns constants.
+struct SiftChunks {
+  static constexpr bool kHasTerms = false;
+  static constexpr int Of(const BestTwoSweep&) { return kNumSiftChunks; }
+};
+struct AnyChunks {
+  static constexpr bool kHasTerms = true;
+  static int Of(const BestTwoSweep& s) { return s.num_chunks; }
+};
 
 // The functions below name every element of `sums` by a constant, through folds over index packs, and never
 // through a closure: otherwise g++ 12 does not keep the array in registers.
@@ -42,9 +50,9 @@ template <class V, class Sum, int G, int... kG>
 
 // sums[r][g] += products of one chunk of row r with the columns of group g.
 template <class V, class Sum, int R, int G, int... kR, int... kG>
-[[gnu::always_inline]] inline void AddChunk(const uint32_t* rows, const uint32_t* columns, Sum (&sums)[R][G],
-                                            Indices<kR...>, Indices<kG...>) {
-  const typename V::Operand column[G] = {V::LoadColumn(columns + kG * kNumChunks * V::kLanes)...};
+[[gnu::always_inline]] inline void AddChunk(const uint32_t* rows, const uint32_t* columns, int num_chunks,
+                                            Sum (&sums)[R][G], Indices<kR...>, Indices<kG...>) {
+  const typename V::Operand column[G] = {V::LoadColumn(columns + kG * num_chunks * V::kLanes)...};
   (AddRow<V, Sum, G>(column, V::LoadRow(rows + kR), sums[kR], Sequence<G>()), ...);
 }
 
@@ -54,9 +62,20 @@ template <class V, int R, int G, int... kG>
   ((sums[kG] = V::Widen(sums[kG], partial[kG])), ...);
 }
 
+template <class V, int G, int... kG>
+[[gnu::always_inline]] inline void LessTerms(const uint32_t* terms, typename V::Vector (&sums)[G],
+                                             Indices<kG...>) {
+  ((sums[kG] = V::Sub(sums[kG], V::Load(terms + kG * V::kLanes))), ...);
+}
+template <class V, int G, int... kG>
+[[gnu::always_inline]] inline void LessTerm(uint32_t term, typename V::Vector (&sums)[G], Indices<kG...>) {
+  ((sums[kG] = V::Sub(sums[kG], V::Set1(term))), ...);
+}
+
 // sums[r][g] = dot products of row r with the columns of group g.
-template <class V, int R, int G, int... kR, int... kG>
+template <class V, class Chunks, int R, int G, int... kR, int... kG>
 [[gnu::always_inline]] inline void Dots(const uint32_t* rows, const uint32_t* columns, const uint32_t* bias,
+                                        const uint32_t* column_terms, int num_chunks,
                                         typename V::Vector (&sums)[R][G], Indices<kR...>, Indices<kG...>) {
   using Vector = typename V::Vector;
   constexpr int L = V::kLanes;
@@ -64,24 +83,26 @@ template <class V, int R, int G, int... kR, int... kG>
     const Vector zero[G] = {(static_cast<void>(kG), V::Set1(V::kSumStart))...};
     Fill<Vector, R, G>(zero, sums, Sequence<G>(), Sequence<R>());
 #pragma GCC unroll 1
-    for (int step = 0; step < kNumChunks / kBestTwoPartialChunks; ++step) {
+    for (int step = 0; step < kNumSiftChunks / kBestTwoPartialChunks; ++step) {
       const typename V::Partial start[G] = {V::StartPartial(bias + (kG * V::kNumBias + step) * L)...};
       typename V::Partial partial[R][G];
       Fill<typename V::Partial, R, G>(start, partial, Sequence<G>(), Sequence<R>());
 #pragma GCC unroll 8
       for (int i = 0; i < kBestTwoPartialChunks; ++i) {
-        AddChunk<V, typename V::Partial, R, G>(rows, columns, partial, Sequence<R>(), Sequence<G>());
+        AddChunk<V, typename V::Partial, R, G>(rows, columns, num_chunks, partial, Sequence<R>(),
+                                               Sequence<G>());
         rows += L;
         columns += L;
       }
       (WidenRow<V, R, G>(partial[kR], sums[kR], Sequence<G>()), ...);
     }
   } else {
-    const Vector start[G] = {V::StartSum(bias + kG * V::kNumBias * L)...};
+    Vector start[G] = {V::StartSum(bias + kG * V::kNumBias * L)...};
+    if constexpr (Chunks::kHasTerms) LessTerms<V, G>(column_terms, start, Sequence<G>());
     Fill<Vector, R, G>(start, sums, Sequence<G>(), Sequence<R>());
 #pragma GCC unroll 1
-    for (int chunk = 0; chunk < kNumChunks; ++chunk) {
-      AddChunk<V, Vector, R, G>(rows, columns, sums, Sequence<R>(), Sequence<G>());
+    for (int chunk = 0; chunk < num_chunks; ++chunk) {
+      AddChunk<V, Vector, R, G>(rows, columns, num_chunks, sums, Sequence<R>(), Sequence<G>());
       rows += L;
       columns += L;
     }
@@ -122,15 +143,20 @@ template <class V, int G, int... kG>
 }
 
 // R rows from `row` of the block against the G column groups from `group`.
-template <class V, int R, int G, int... kR, int... kG>
+template <class V, class Chunks, int R, int G, int... kR, int... kG>
 [[gnu::always_inline]] inline void SweepBlock(const BestTwoSweep& s, int row, int group, Indices<kR...>,
                                               Indices<kG...>) {
   using Vector = typename V::Vector;
   constexpr int L = V::kLanes;
   Vector sums[R][G];
-  Dots<V, R, G>(s.rows + static_cast<int64_t>(row / L) * kNumChunks * L + row % L,
-                s.columns + static_cast<int64_t>(group) * kNumChunks * L,
-                s.bias + static_cast<int64_t>(group) * V::kNumBias * L, sums, Sequence<R>(), Sequence<G>());
+  const int num_chunks = Chunks::Of(s);
+  const uint32_t* column_terms = nullptr;
+  if constexpr (Chunks::kHasTerms) column_terms = s.column_terms + static_cast<int64_t>(group) * L;
+  Dots<V, Chunks, R, G>(s.rows + static_cast<int64_t>(row / L) * num_chunks * L + row % L,
+                        s.columns + static_cast<int64_t>(group) * num_chunks * L,
+                        s.bias + static_cast<int64_t>(group) * V::kNumBias * L, column_terms, num_chunks,
+                        sums, Sequence<R>(), Sequence<G>());
+  if constexpr (Chunks::kHasTerms) (LessTerm<V, G>(s.row_terms[row + kR], sums[kR], Sequence<G>()), ...);
   (ShiftRow<V, G>(s.index_bits, sums[kR], Sequence<G>()), ...);
   const uint32_t last = (uint32_t{1} << s.index_bits) - 1;
   uint32_t* column_state = s.column_keys + static_cast<int64_t>(group) * 2 * L;
@@ -144,13 +170,13 @@ template <class V, int R, int G, int... kR, int... kG>
 }
 
 // The last groups of a tile, fewer than kGroupBlock.
-template <class V, int G>
+template <class V, class Chunks, int G>
 inline void SweepRemainder(const BestTwoSweep& s, int row, int group, int num_groups) {
   if constexpr (G > 0) {
     if (num_groups == G) {
-      SweepBlock<V, V::kRowBlock, G>(s, row, group, Sequence<V::kRowBlock>(), Sequence<G>());
+      SweepBlock<V, Chunks, V::kRowBlock, G>(s, row, group, Sequence<V::kRowBlock>(), Sequence<G>());
     } else {
-      SweepRemainder<V, G - 1>(s, row, group, num_groups);
+      SweepRemainder<V, Chunks, G - 1>(s, row, group, num_groups);
     }
   }
 }
@@ -166,24 +192,26 @@ inline void MergeLanes(typename V::Vector* best, typename V::Vector* second) {
   }
 }
 
-template <class V>
-inline void SweepAll(const BestTwoSweep& s) {
+template <class V, class Chunks>
+inline void SweepTiles(const BestTwoSweep& s) {
   constexpr int L = V::kLanes;
+  // Wider descriptors, fewer of them in the first-level cache.
+  const int num_fit = V::kTileGroups * kNumSiftChunks / Chunks::Of(s);
+  const int tile_groups = num_fit > V::kGroupBlock ? num_fit : V::kGroupBlock;
   const int num_rows = s.num_row_groups * L;
   const auto zero = V::Set1(0);
   for (int i = 0; i < 2 * num_rows; ++i) V::Store(s.row_states + static_cast<int64_t>(i) * L, zero);
   for (int i = 0; i < 2 * s.num_column_groups; ++i)
     V::Store(s.column_keys + static_cast<int64_t>(i) * L, zero);
 
-  for (int begin = 0; begin < s.num_column_groups; begin += V::kTileGroups) {
-    const int end =
-        begin + V::kTileGroups < s.num_column_groups ? begin + V::kTileGroups : s.num_column_groups;
+  for (int begin = 0; begin < s.num_column_groups; begin += tile_groups) {
+    const int end = begin + tile_groups < s.num_column_groups ? begin + tile_groups : s.num_column_groups;
     for (int row = 0; row < num_rows; row += V::kRowBlock) {
       int group = begin;
       for (; group + V::kGroupBlock <= end; group += V::kGroupBlock)
-        SweepBlock<V, V::kRowBlock, V::kGroupBlock>(s, row, group, Sequence<V::kRowBlock>(),
-                                                    Sequence<V::kGroupBlock>());
-      SweepRemainder<V, V::kGroupBlock - 1>(s, row, group, end - group);
+        SweepBlock<V, Chunks, V::kRowBlock, V::kGroupBlock>(s, row, group, Sequence<V::kRowBlock>(),
+                                                            Sequence<V::kGroupBlock>());
+      SweepRemainder<V, Chunks, V::kGroupBlock - 1>(s, row, group, end - group);
     }
   }
   for (int row = 0; row < num_rows; ++row) {
@@ -193,6 +221,14 @@ inline void SweepAll(const BestTwoSweep& s) {
     s.row_keys[2 * row] = V::First(best);
     s.row_keys[2 * row + 1] = V::First(second);
   }
+}
+
+template <class V>
+inline void SweepAll(const BestTwoSweep& s) {
+  if constexpr (!V::kPartial) {
+    if (s.column_terms != nullptr) return SweepTiles<V, AnyChunks>(s);
+  }
+  SweepTiles<V, SiftChunks>(s);
 }
 
 }  // namespace cairn::best_two_internal

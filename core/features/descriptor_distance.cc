@@ -1,13 +1,71 @@
 #include "core/features/descriptor_distance.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "core/features/wide_clones.h"
 
 namespace cairn {
+namespace {
 
-CAIRN_WIDE_CLONES int32_t DescriptorDot(const uint8_t* a, const uint8_t* b) {
+constexpr double kRightAngle = std::numbers::pi / 2;
+constexpr double kUnlikeDenseRad = 0.75;
+
+CAIRN_WIDE_CLONES int32_t SiftDot(const uint8_t* a, const uint8_t* b) {
   int32_t dot = 0;
-  for (int d = 0; d < kDescriptorDim; ++d) dot += static_cast<int32_t>(a[d]) * b[d];
+  for (int d = 0; d < kSiftDescriptorDim; ++d) dot += static_cast<int32_t>(a[d]) * b[d];
   return dot;
+}
+
+CAIRN_WIDE_CLONES int32_t CentredDot(const uint8_t* a, const uint8_t* b, int num_values, int offset) {
+  int32_t dot = 0;
+  for (int d = 0; d < num_values; ++d)
+    dot += (static_cast<int32_t>(a[d]) - offset) * (static_cast<int32_t>(b[d]) - offset);
+  return std::max(dot, 0);
+}
+
+}  // namespace
+
+int32_t DescriptorDot(const uint8_t* a, const uint8_t* b, const DescriptorSpace& space) {
+  if (space.num_values == kSiftDescriptorDim && space.offset == 0) return SiftDot(a, b);
+  return CentredDot(a, b, space.num_values, space.offset);
+}
+
+double DescriptorAngleRad(int32_t dot, const DescriptorSpace& space) {
+  const double cosine = std::clamp(dot / space.squared_norm, 0.0, 1.0);
+  switch (space.measure) {
+    case DescriptorMeasure::kAngle:
+      return std::acos(cosine);
+    case DescriptorMeasure::kHamming:
+      return kRightAngle * (1 - cosine);
+    case DescriptorMeasure::kDense: {
+      const double ratio = std::acos(cosine) / kUnlikeDenseRad;
+      return std::min(kRightAngle, kRightAngle * ratio * ratio * ratio * ratio);
+    }
+  }
+  return 0;
+}
+
+double DotAtAngle(double angle_rad, const DescriptorSpace& space) {
+  switch (space.measure) {
+    case DescriptorMeasure::kAngle:
+      return space.squared_norm * std::cos(angle_rad);
+    case DescriptorMeasure::kHamming:
+      return space.squared_norm * (1 - angle_rad / kRightAngle);
+    case DescriptorMeasure::kDense:
+      return space.squared_norm * std::cos(kUnlikeDenseRad * std::sqrt(std::sqrt(angle_rad / kRightAngle)));
+  }
+  return 0;
+}
+
+DescriptorRow MeanDescriptor(const Eigen::Matrix<double, 1, Eigen::Dynamic>& sum, int64_t num,
+                             const DescriptorSpace& space) {
+  Eigen::Matrix<double, 1, Eigen::Dynamic> direction =
+      sum.array() - static_cast<double>(num) * static_cast<double>(space.offset);
+  const double norm = direction.norm();
+  if (norm > 0) direction *= std::sqrt(space.squared_norm) / norm;
+  return (direction.array() + space.offset).round().cwiseMax(0.0).cwiseMin(255.0).cast<uint8_t>();
 }
 
 }  // namespace cairn

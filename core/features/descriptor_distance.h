@@ -1,22 +1,23 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 
 #include "core/features/features.h"
 
 namespace cairn {
 
-// Squared norm of a RootSIFT descriptor, up to rounding.
-inline constexpr double kSquaredDescriptorNorm = 512.0 * 512.0;
+// Dot product of two descriptors as vectors about the space's offset; where they are at right angles or more
+// (dot products of 0 and less), 0.
+int32_t DescriptorDot(const uint8_t* a, const uint8_t* b, const DescriptorSpace& space = {});
 
-// Dot product of two descriptors of kDescriptorDim entries.
-int32_t DescriptorDot(const uint8_t* a, const uint8_t* b);
+// How far two descriptors of this dot product are from each other (DescriptorMeasure): an angle, radians in
+// [0, pi / 2].
+double DescriptorAngleRad(int32_t dot, const DescriptorSpace& space = {});
+// The dot product of two descriptors that are so far from each other.
+double DotAtAngle(double angle_rad, const DescriptorSpace& space = {});
 
-// The angle between two RootSIFT descriptors of this dot product, radians in [0, pi / 2].
-inline double DescriptorAngleRad(int32_t dot) {
-  return std::acos(std::clamp(dot / kSquaredDescriptorNorm, 0.0, 1.0));
-}
+// The direction of a sum of `num` descriptors, as a descriptor; that of no direction is the offset.
+DescriptorRow MeanDescriptor(const Eigen::Matrix<double, 1, Eigen::Dynamic>& sum, int64_t num,
+                             const DescriptorSpace& space = {});
 
 }  // namespace cairn

@@ -10,13 +10,21 @@
 namespace cairn {
 namespace {
 
-constexpr int kNumChunks = kDescriptorDim / 4;
 // Indices of at most 8191 in a sweep: its states stay in the second-level cache.
 constexpr int kMaxIndexBits = 13;
 
 // Kept from pair to pair: allocating takes longer than matching small images.
 struct Scratch {
-  AlignedWords rows, row_states, row_keys, column_keys;
+  AlignedWords rows, row_terms, row_states, row_keys, column_keys;
+};
+
+// Of a space.
+struct SweepSpace {
+  int num_chunks = 0;
+  uint32_t offset = 0;
+  bool has_terms = false;  // other than SIFT's
+  // Added to dot products about the offset, so that none is negative.
+  uint32_t shift = 0;
 };
 
 // A run of groups of a block.
@@ -27,8 +35,9 @@ struct GroupRange {
 };
 
 // The range's rows less the kernel's offset.
-const uint32_t* OffsetRows(const GroupRange& range, const BestTwoKernel& kernel, AlignedWords* scratch) {
-  const int64_t group_size = kNumChunks * kernel.lanes;
+const uint32_t* OffsetRows(const GroupRange& range, const BestTwoKernel& kernel, int num_chunks,
+                           AlignedWords* scratch) {
+  const int64_t group_size = static_cast<int64_t>(num_chunks) * kernel.lanes;
   const uint32_t* rows = range.block.words.data() + range.begin * group_size;
   if (kernel.row_offset == 0) return rows;
   const int64_t num_words = (range.end - range.begin) * group_size;
@@ -40,21 +49,35 @@ const uint32_t* OffsetRows(const GroupRange& range, const BestTwoKernel& kernel,
   return scratch->data();
 }
 
+// Of each of the range's rows: what is subtracted from its products with the columns' values, besides the
+// terms of the columns.
+const uint32_t* RowTerms(const GroupRange& range, int lanes, const SweepSpace& space, AlignedWords* scratch) {
+  const int num_rows = (range.end - range.begin) * lanes;
+  scratch->Resize(num_rows);
+  const uint32_t* terms = range.block.terms.data() + static_cast<int64_t>(range.begin) * lanes;
+  // (a - o) (b - o) = a b - o a - o b + o^2, of every value
+  const uint32_t common = 4 * space.num_chunks * space.offset * space.offset + space.shift;
+  for (int i = 0; i < num_rows; ++i) scratch->data()[i] = terms[i] - common;
+  return scratch->data();
+}
+
 // Offers the best two of a sweep, as keys, to a descriptor of the other image than that of `range`.
 void Offer(uint32_t best_key, uint32_t second_key, int index_bits, const GroupRange& range, int lanes,
-           BestTwo* kept) {
+           const SweepSpace& space, BestTwo* kept) {
   const uint32_t last = (uint32_t{1} << index_bits) - 1;
   const int first = range.begin * lanes;
   const int num = static_cast<int>(range.block.idx.size());
-  // -1 for padding, which comes after all that is real.
+  // -1 for padding, which comes after all that counts, and for what is at a right angle or more.
   const auto position = [&](uint32_t key) {
     const int i = first + static_cast<int>(last - (key & last));
-    return key != 0 && i < num ? i : -1;
+    const bool counts = space.has_terms ? key >> index_bits > space.shift : key != 0;
+    return counts && i < num ? i : -1;
   };
+  const auto dot = [&](uint32_t key) { return static_cast<int32_t>((key >> index_bits) - space.shift); };
   const int best_position = position(best_key);
   if (best_position < 0) return;
-  const auto best = static_cast<int32_t>(best_key >> index_bits);
-  const int32_t second = position(second_key) < 0 ? -1 : static_cast<int32_t>(second_key >> index_bits);
+  const int32_t best = dot(best_key);
+  const int32_t second = position(second_key) < 0 ? -1 : dot(second_key);
   const int32_t idx = range.block.idx[best_position];
   if (best > kept->best || (best == kept->best && idx < kept->idx)) {
     *kept = {idx, best, std::max(kept->best, second)};
@@ -64,7 +87,7 @@ void Offer(uint32_t best_key, uint32_t second_key, int index_bits, const GroupRa
 }
 
 void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestTwoKernel& kernel,
-                 int index_bits, Scratch* scratch, std::vector<BestTwo>* rows,
+                 const SweepSpace& space, int index_bits, Scratch* scratch, std::vector<BestTwo>* rows,
                  std::vector<BestTwo>* columns) {
   const int lanes = kernel.lanes;
   BestTwoSweep sweep;
@@ -75,8 +98,13 @@ void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestT
   scratch->row_states.Resize(num_rows * 2 * lanes);
   scratch->row_keys.Resize(num_rows * 2);
   scratch->column_keys.Resize(static_cast<int64_t>(sweep.num_column_groups) * 2 * lanes);
-  sweep.rows = OffsetRows(range1, kernel, &scratch->rows);
-  sweep.columns = range2.block.words.data() + static_cast<int64_t>(range2.begin) * kNumChunks * lanes;
+  sweep.num_chunks = space.num_chunks;
+  sweep.rows = OffsetRows(range1, kernel, space.num_chunks, &scratch->rows);
+  sweep.columns = range2.block.words.data() + static_cast<int64_t>(range2.begin) * space.num_chunks * lanes;
+  if (space.has_terms) {
+    sweep.row_terms = RowTerms(range1, lanes, space, &scratch->row_terms);
+    sweep.column_terms = range2.block.terms.data() + static_cast<int64_t>(range2.begin) * lanes;
+  }
   if (kernel.num_bias > 0)
     sweep.bias = range2.block.bias.data() + static_cast<int64_t>(range2.begin) * kernel.num_bias * lanes;
   sweep.row_states = scratch->row_states.data();
@@ -87,30 +115,32 @@ void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestT
   const int num1 = std::min(range1.end * lanes, static_cast<int>(range1.block.idx.size()));
   for (int i = range1.begin * lanes; i < num1; ++i) {
     const uint32_t* keys = sweep.row_keys + 2 * (i - range1.begin * lanes);
-    Offer(keys[0], keys[1], index_bits, range2, lanes, &(*rows)[range1.block.idx[i]]);
+    Offer(keys[0], keys[1], index_bits, range2, lanes, space, &(*rows)[range1.block.idx[i]]);
   }
   const int num2 = std::min(range2.end * lanes, static_cast<int>(range2.block.idx.size()));
   for (int i = range2.begin * lanes; i < num2; ++i) {
     const uint32_t* keys =
         sweep.column_keys + static_cast<int64_t>(i / lanes - range2.begin) * 2 * lanes + i % lanes;
-    Offer(keys[0], keys[lanes], index_bits, range1, lanes, &(*columns)[range2.block.idx[i]]);
+    Offer(keys[0], keys[lanes], index_bits, range1, lanes, space, &(*columns)[range2.block.idx[i]]);
   }
 }
 
 // All of a block of one image with all of a block of the other, in ranges that keys can index.
 void SweepBlocks(const DescriptorBlock& block1, const DescriptorBlock& block2, const BestTwoKernel& kernel,
-                 Scratch* scratch, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
+                 SweepSpace space, Scratch* scratch, std::vector<BestTwo>* rows,
+                 std::vector<BestTwo>* columns) {
   // Cauchy and Schwarz: no product is larger.
   const double max_dot =
       std::sqrt(static_cast<double>(block1.max_squared_norm) * static_cast<double>(block2.max_squared_norm));
-  const int dot_bits = std::bit_width(static_cast<uint32_t>(max_dot) + 1);
+  if (space.has_terms) space.shift = static_cast<uint32_t>(max_dot) + 1;
+  const int dot_bits = std::bit_width(static_cast<uint32_t>(max_dot) + 1 + space.shift);
   const int index_bits = std::min(kernel.key_bits - dot_bits, kMaxIndexBits);
   const int max_groups = ((1 << index_bits) - 1) / kernel.lanes;
   for (int begin2 = 0; begin2 < block2.num_groups; begin2 += max_groups) {
     const GroupRange range2{block2, begin2, std::min(begin2 + max_groups, block2.num_groups)};
     for (int begin1 = 0; begin1 < block1.num_groups; begin1 += max_groups) {
       const GroupRange range1{block1, begin1, std::min(begin1 + max_groups, block1.num_groups)};
-      SweepRanges(range1, range2, kernel, index_bits, scratch, rows, columns);
+      SweepRanges(range1, range2, kernel, space, index_bits, scratch, rows, columns);
     }
   }
 }
@@ -123,23 +153,29 @@ void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors&
   rows->assign(descriptors1.size(), {});
   columns->assign(descriptors2.size(), {});
   const BestTwoKernel& kernel = KernelForAll(descriptors1.kernel());
+  const DescriptorSpace& of = descriptors1.space();
+  const SweepSpace space{.num_chunks = NumChunks(of),
+                         .offset = static_cast<uint32_t>(of.offset),
+                         .has_terms = of != DescriptorSpace()};
   if (const BestTwoKernel* for_small = KernelForSmall(descriptors1.kernel()))
-    SweepBlocks(descriptors1.small(), descriptors2.small(), *for_small, &scratch, rows, columns);
-  SweepBlocks(descriptors1.small(), descriptors2.other(), kernel, &scratch, rows, columns);
-  SweepBlocks(descriptors1.other(), descriptors2.small(), kernel, &scratch, rows, columns);
-  SweepBlocks(descriptors1.other(), descriptors2.other(), kernel, &scratch, rows, columns);
+    SweepBlocks(descriptors1.small(), descriptors2.small(), *for_small, space, &scratch, rows, columns);
+  SweepBlocks(descriptors1.small(), descriptors2.other(), kernel, space, &scratch, rows, columns);
+  SweepBlocks(descriptors1.other(), descriptors2.small(), kernel, space, &scratch, rows, columns);
+  SweepBlocks(descriptors1.other(), descriptors2.other(), kernel, space, &scratch, rows, columns);
 }
 
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
-                 MatchKernel kernel, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
-  FindBestTwo(PackedDescriptors(descriptors1, kernel), PackedDescriptors(descriptors2, kernel), rows,
-              columns);
+                 const DescriptorSpace& space, MatchKernel kernel, std::vector<BestTwo>* rows,
+                 std::vector<BestTwo>* columns) {
+  FindBestTwo(PackedDescriptors(descriptors1, space, kernel), PackedDescriptors(descriptors2, space, kernel),
+              rows, columns);
 }
 
 std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
-                                    const DescriptorMatrix& descriptors2,
+                                    const DescriptorMatrix& descriptors2, const DescriptorSpace& space,
                                     const DescriptorMatcherOptions& options) {
-  return MatchDescriptors(PackedDescriptors(descriptors1), PackedDescriptors(descriptors2), options);
+  return MatchDescriptors(PackedDescriptors(descriptors1, space), PackedDescriptors(descriptors2, space),
+                          options);
 }
 
 std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
@@ -148,9 +184,10 @@ std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
   std::vector<BestTwo> rows, columns;
   FindBestTwo(descriptors1, descriptors2, &rows, &columns);
   const auto passes = [&](const BestTwo& b) {
-    const double best = DescriptorAngleRad(b.best);
+    const DescriptorSpace& space = descriptors1.space();
+    const double best = DescriptorAngleRad(b.best, space);
     return best <= options.max_angle_rad &&
-           (b.second < 0 || best < options.max_ratio * DescriptorAngleRad(b.second));
+           (b.second < 0 || best < options.max_ratio * DescriptorAngleRad(b.second, space));
   };
   std::vector<Match> matches;
   for (uint32_t row = 0; row < rows.size(); ++row) {

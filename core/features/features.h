@@ -1,14 +1,18 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "core/base/error.h"
+
 namespace cairn {
 
-// A SIFT keypoint.  Position in COLMAP's pixels (first pixel's centre at (0.5, 0.5)); scale = sigma in pixels
-// of the image; orientation in radians, as COLMAP stores it.
+// A keypoint.  Position in COLMAP's pixels (first pixel's centre at (0.5, 0.5)); scale = sigma in pixels
+// of the image; orientation in radians, as COLMAP stores it.  Scale 0: what found it measures neither.
 struct Keypoint {
   float x = 0;
   float y = 0;
@@ -16,15 +20,92 @@ struct Keypoint {
   float orientation = 0;
 };
 
-inline constexpr int kDescriptorDim = 128;
-// One RootSIFT descriptor per row, quantised like COLMAP's: round(512 sqrt(v / |v|_1)), at most 255.  Squared
-// norm near 512^2.
-using DescriptorMatrix = Eigen::Matrix<uint8_t, Eigen::Dynamic, kDescriptorDim, Eigen::RowMajor>;
+inline constexpr int kSiftDescriptorDim = 128;  // values of a SIFT descriptor
+inline constexpr int kMinDescriptorDim = 32;
+inline constexpr int kMaxDescriptorDim = 1024;
+
+// One descriptor per row, of 8-bit values; DescriptorKind says what they mean.
+using DescriptorMatrix = Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using DescriptorRow = Eigen::Matrix<uint8_t, 1, Eigen::Dynamic>;
+
+// How descriptors are compared.  All are vectors of 8-bit values less an offset, and the nearest of a
+// descriptor is the one at the smallest angle.  How near that is says a measure of its own for each type, all
+// on the scale of the angles of SIFT: pi / 2 and more stands for unlike ones, and one set of limits and
+// ratios serves for all.
+enum class DescriptorMeasure {
+  kAngle,    // the angle itself
+  kHamming,  // of bits, of which h of n differ (the angle is arc cos (1 - 2 h / n)): pi h / n
+  kDense,    // the angle to the fourth, pi / 2 at 0.75 rad: DescriptorType::kDense says why
+};
+struct DescriptorSpace {
+  int num_values = kSiftDescriptorDim;
+  int offset = 0;  // the value that stands for 0
+  DescriptorMeasure measure = DescriptorMeasure::kAngle;
+  double squared_norm = 512.0 * 512.0;  // of every vector, up to rounding
+  friend bool operator==(const DescriptorSpace&, const DescriptorSpace&) = default;
+};
+
+// The values are not stored: what is (DescriptorKind) is text.
+enum class DescriptorType {
+  // RootSIFT, quantised like COLMAP's: round(512 sqrt(v / |v|_1)), at most 255.
+  kSift,
+  // Values of any detector that are compared by their angle: DescriptorsFromFloats.
+  kFloat,
+  // Values of a net that describes all of an image, from which some places are taken: those beside a place
+  // look
+  // like it, so that the second best says little about the best.
+  kDense,
+  // Bits, each 0 or twice the offset.
+  kBinary,
+};
+
+// What the descriptors of an image, a survey or a map are: those of different kinds cannot be compared.
+struct DescriptorKind {
+  DescriptorType type = DescriptorType::kSift;
+  int num_values = kSiftDescriptorDim;  // bits of a binary descriptor
+  std::string extractor;  // what made them, in a word ("xfeat", "orb"); empty: not known, or SIFT
+
+  DescriptorSpace space() const;
+  bool is_sift() const { return type == DescriptorType::kSift; }
+  friend bool operator==(const DescriptorKind&, const DescriptorKind&) = default;
+};
+
+// Descriptors of floating-point values, one per row, of any length, in 8 bits about 128: 32 for the root mean
+// square of a row, and no value farther than 127 (what is more is cut off, and the rest made longer, as Lowe
+// does it with SIFT ["Distinctive image features from scale-invariant keypoints", IJCV 2004, section 6.1]).
+// The cosine of the angle between two changes by less than 0.01.  A row of zeros becomes one of 128.
+// Errors: InvalidArgument (a value that is not finite; a number of columns that is not kind's).
+using FloatDescriptors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+Result<DescriptorMatrix> DescriptorsFromFloats(const FloatDescriptors& values, const DescriptorKind& kind);
+
+// Descriptors of bits, eight a byte, the lowest bit of a byte first: row i of `bytes` begins at i *
+// num_bytes. A bit takes a byte then: products of bytes are what processors are fast at. REQUIRES: 8 *
+// num_bytes == kind.num_values
+DescriptorMatrix DescriptorsFromBits(const uint8_t* bytes, int64_t num_rows, int64_t num_bytes,
+                                     const DescriptorKind& kind);
+// Descriptors of bytes as they come from an extractor: SIFT's 128, or the bits of a binary kind.
+// Errors: InvalidArgument (another number of bytes; a kind of floating-point values).
+Result<DescriptorMatrix> DescriptorsFromBytes(const uint8_t* bytes, int64_t num_rows, int64_t num_bytes,
+                                              const DescriptorKind& kind);
+// Makes the means of binary descriptors binary: a bit is what most of them have, 0 where as many have 1.
+void RoundToBits(const DescriptorKind& kind, DescriptorMatrix* descriptors);
+// And back: of each descriptor the bits, as they came.
+std::string BitsOfDescriptors(const DescriptorMatrix& descriptors);
+
+// "sift"; "float 64 xfeat", "binary 256": type, values, and the extractor where it is known.
+std::string ToString(const DescriptorKind& kind);
+// Errors: Corrupt (another text, or fewer than kMinDescriptorDim or more than kMaxDescriptorDim values).
+Result<DescriptorKind> ParseDescriptorKind(std::string_view text);
+
+// Whether descriptors of the one may be compared with those of the other: an extractor that is not known may
+// be any.  Errors: InvalidArgument, in words: what `what` has, and what is expected.
+Status CheckSameKind(const DescriptorKind& found, const DescriptorKind& expected, std::string_view what);
 
 // The features of one image, row i of `descriptors` belonging to keypoint i.
 struct Features {
   std::vector<Keypoint> keypoints;
-  DescriptorMatrix descriptors;
+  DescriptorMatrix descriptors = DescriptorMatrix(0, kSiftDescriptorDim);
+  DescriptorKind kind;
 };
 
 // A pair of keypoint indices, of the first and of the second image (or of a query and a landmark).

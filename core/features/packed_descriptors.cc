@@ -14,7 +14,7 @@
 namespace cairn {
 namespace {
 
-constexpr int kNumChunks = kDescriptorDim / 4;
+static_assert(4 * kNumSiftChunks == kSiftDescriptorDim);
 constexpr int kNumSubsets = 8;   // sets of values whose products are summed in one 16-bit lane
 constexpr int kSubsetSize = 16;  // in pairs that one instruction multiplies and adds
 
@@ -28,31 +28,32 @@ constexpr int DimOf(int subset, int k) {
 }
 
 // Values in packed order: word `chunk` of a descriptor holds a pair of each of two subsets.
-constexpr std::array<int, kDescriptorDim> PackedOrder() {
-  std::array<int, kDescriptorDim> order{};
-  for (int i = 0; i < kDescriptorDim; ++i) {
+constexpr std::array<int, kSiftDescriptorDim> PackedOrder() {
+  std::array<int, kSiftDescriptorDim> order{};
+  for (int i = 0; i < kSiftDescriptorDim; ++i) {
     const int chunk = i / 4, pair = i % 4 / 2;
     const int subset = chunk / kBestTwoPartialChunks * 2 + pair;
     order[i] = DimOf(subset, chunk % kBestTwoPartialChunks * 2 + i % 2);
   }
   return order;
 }
-constexpr std::array<int, kDescriptorDim> kPackedOrder = PackedOrder();
+constexpr std::array<int, kSiftDescriptorDim> kPackedOrder = PackedOrder();
 
-using Values = std::array<uint8_t, kDescriptorDim>;
+using SiftValues = std::array<uint8_t, kSiftDescriptorDim>;
+using PackedValues = std::array<uint8_t, kMaxDescriptorDim>;  // the first four for each chunk
 
-Values Reorder(const uint8_t* values) {
-  Values reordered;
-  for (int i = 0; i < kDescriptorDim; ++i) reordered[i] = values[kPackedOrder[i]];
+SiftValues Reorder(const uint8_t* values) {
+  SiftValues reordered;
+  for (int i = 0; i < kSiftDescriptorDim; ++i) reordered[i] = values[kPackedOrder[i]];
   return reordered;
 }
 
 // Whether the kernels for small values are exact for this descriptor and any other one that passes this test.
 // By Cauchy and Schwarz it suffices to bound the norms of what is multiplied: of pairs, one of them less the
 // row offset of 64 in signed 8 bits (signed 16-bit sums), and of subsets (unsigned 16-bit sums).
-bool FitsIn16Bits(const Values& values) {
+bool FitsIn16Bits(const SiftValues& values) {
   std::array<int, kNumSubsets> subset_norms{};
-  for (int i = 0; i < kDescriptorDim; i += 2) {
+  for (int i = 0; i < kSiftDescriptorDim; i += 2) {
     const int a = values[i], b = values[i + 1];
     const int norm = a * a + b * b;
     if (a > 191 || b > 191 || norm > 32767 || (a - 64) * (a - 64) + (b - 64) * (b - 64) > 32767) return false;
@@ -61,44 +62,66 @@ bool FitsIn16Bits(const Values& values) {
   return *std::max_element(subset_norms.begin(), subset_norms.end()) <= 65535;
 }
 
-// Compensates for the row offset: in the whole sum, or in each subset's sum, where it also subtracts 2^15.
-void SetBias(const Values& values, const BestTwoKernel& kernel, uint32_t* bias) {
+// Compensates for the row offset in each subset's sum, where it also subtracts 2^15.  `values` in packed
+// order.
+void SetPartialBias(const PackedValues& values, const BestTwoKernel& kernel, uint32_t* bias) {
   std::array<uint32_t, kNumSubsets> sums{};
-  for (int i = 0; i < kDescriptorDim; ++i)
+  for (int i = 0; i < kSiftDescriptorDim; ++i)
     sums[i / 4 / kBestTwoPartialChunks * 2 + i % 4 / 2] += kernel.row_offset * values[i];
-  if (kernel.num_bias == 1) {
-    for (const uint32_t sum : sums) *bias += sum;
+  for (int i = 0; i < kernel.num_bias; ++i)
+    bias[i * kernel.lanes] = ((sums[2 * i] - 32768) & 0xFFFF) | ((sums[2 * i + 1] - 32768) & 0xFFFF) << 16;
+}
+
+bool IsSift(const DescriptorSpace& space) { return space == DescriptorSpace(); }
+
+// The values of a descriptor in the order in which they are packed; after others than SIFT's, some that stand
+// for 0.
+void PackValues(const uint8_t* descriptor, const DescriptorSpace& space, PackedValues* packed) {
+  if (IsSift(space)) {
+    const SiftValues values = Reorder(descriptor);
+    std::copy(values.begin(), values.end(), packed->begin());
   } else {
-    for (int i = 0; i < kernel.num_bias; ++i) {
-      bias[i * kernel.lanes] = ((sums[2 * i] - 32768) & 0xFFFF) | ((sums[2 * i + 1] - 32768) & 0xFFFF) << 16;
-    }
+    std::copy_n(descriptor, space.num_values, packed->begin());
   }
 }
 
-void Pack(const DescriptorMatrix& descriptors, const BestTwoKernel& kernel, DescriptorBlock* block) {
+void Pack(const DescriptorMatrix& descriptors, const DescriptorSpace& space, const BestTwoKernel& kernel,
+          DescriptorBlock* block) {
   const int lanes = kernel.lanes, num = static_cast<int>(block->idx.size());
+  const int num_chunks = NumChunks(space);
   block->num_groups = (num + lanes - 1) / lanes;
-  block->words.Resize(static_cast<int64_t>(block->num_groups) * kNumChunks * lanes);
+  block->words.Resize(static_cast<int64_t>(block->num_groups) * num_chunks * lanes);
   block->bias.Resize(static_cast<int64_t>(block->num_groups) * kernel.num_bias * lanes);
+  if (!IsSift(space)) block->terms.Resize(static_cast<int64_t>(block->num_groups) * lanes);
+  PackedValues values;
+  values.fill(static_cast<uint8_t>(space.offset));
   for (int i = 0; i < block->num_groups * lanes; ++i) {
-    Values values{};
-    if (i < num) values = Reorder(descriptors.row(block->idx[i]).data());
-    uint32_t* words = block->words.data() + static_cast<int64_t>(i / lanes) * kNumChunks * lanes + i % lanes;
+    if (i < num) {
+      PackValues(descriptors.row(block->idx[i]).data(), space, &values);
+    } else if (i == num) {
+      values.fill(static_cast<uint8_t>(space.offset));
+    }
+    uint32_t* words = block->words.data() + static_cast<int64_t>(i / lanes) * num_chunks * lanes + i % lanes;
     int64_t squared_norm = 0;
-    for (int chunk = 0; chunk < kNumChunks; ++chunk) {
+    uint32_t sum = 0;
+    for (int chunk = 0; chunk < num_chunks; ++chunk) {
       uint32_t word = 0;
       for (int byte = 0; byte < 4; ++byte) {
-        const uint32_t value = values[4 * chunk + byte];
-        word |= value << (8 * byte);
-        squared_norm += value * value;
+        const int32_t value = values[4 * chunk + byte];
+        word |= static_cast<uint32_t>(value) << (8 * byte);
+        sum += value;
+        squared_norm += (value - space.offset) * (value - space.offset);
       }
       words[chunk * lanes] = word;
     }
     block->max_squared_norm = std::max(block->max_squared_norm, squared_norm);
     if (kernel.num_bias > 0) {
-      SetBias(values, kernel,
-              block->bias.data() + static_cast<int64_t>(i / lanes) * kernel.num_bias * lanes + i % lanes);
+      uint32_t* bias =
+          block->bias.data() + static_cast<int64_t>(i / lanes) * kernel.num_bias * lanes + i % lanes;
+      if (kernel.num_bias == 1) *bias = kernel.row_offset * sum;
+      if (kernel.num_bias > 1) SetPartialBias(values, kernel, bias);
     }
+    if (!IsSift(space)) block->terms.data()[i] = space.offset * sum;
   }
 }
 
@@ -172,24 +195,25 @@ const BestTwoKernel* KernelForSmall(MatchKernel kernel) {
   return kernel == MatchKernel::kPortable ? &kBestTwoPortableSmall : nullptr;
 }
 
-PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel)
-    : kernel_(kernel) {
-  const BestTwoKernel* for_small = KernelForSmall(kernel);
+PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, const DescriptorSpace& space,
+                                     MatchKernel kernel)
+    : kernel_(kernel), space_(space) {
+  const BestTwoKernel* for_small = IsSift(space) ? KernelForSmall(kernel) : nullptr;
   for (int32_t i = 0; i < descriptors.rows(); ++i) {
     const bool is_small = for_small != nullptr && FitsIn16Bits(Reorder(descriptors.row(i).data()));
     (is_small ? small_ : other_).idx.push_back(i);
   }
   small_.idx.shrink_to_fit();
   other_.idx.shrink_to_fit();
-  if (for_small != nullptr) Pack(descriptors, *for_small, &small_);
-  Pack(descriptors, KernelForAll(kernel), &other_);
+  if (for_small != nullptr) Pack(descriptors, space, *for_small, &small_);
+  Pack(descriptors, space, KernelForAll(kernel), &other_);
 }
 
 int64_t PackedDescriptors::num_bytes() const {
   int64_t num_bytes = sizeof(*this);
   for (const DescriptorBlock* block : {&small_, &other_}) {
     num_bytes += static_cast<int64_t>(block->idx.capacity() * sizeof(int32_t)) + block->words.num_bytes() +
-                 block->bias.num_bytes();
+                 block->bias.num_bytes() + block->terms.num_bytes();
   }
   return num_bytes;
 }

@@ -39,33 +39,39 @@ class AlignedWords {
   std::vector<Line> lines_;
 };
 
-// Descriptors in the layout of core/features/best_two_kernel.h, values in an order that mixes the cells and
-// directions of SIFT: 16-bit sums of the products of neighbours are then exact for nearly all
-// RootSIFT descriptors.
+// Descriptors in the layout of core/features/best_two_kernel.h, those of SIFT with their values in an order
+// that mixes its cells and directions: 16-bit sums of the products of neighbours are then exact for nearly
+// all RootSIFT descriptors.
 struct DescriptorBlock {
   std::vector<int32_t> idx;  // of each descriptor in its image, ascending
   AlignedWords words;
   AlignedWords bias;
+  AlignedWords terms;  // the space's offset times the sum of values; none of SIFT's
   int num_groups = 0;
-  int64_t max_squared_norm = 0;
+  int64_t max_squared_norm = 0;  // about the offset
 };
 
 // The descriptors of one image (any 8-bit values) in the layout of a kernel: packed once, matched with many
-// others.  Immutable, may be shared between threads.
+// others of the same space.  Immutable, may be shared between threads.
 class PackedDescriptors {
  public:
   PackedDescriptors() = default;
-  // REQUIRES: IsKernelSupported(kernel)
-  explicit PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel = FastestKernel());
+  // REQUIRES: IsKernelSupported(kernel); descriptors of space.num_values columns, or no rows
+  explicit PackedDescriptors(const DescriptorMatrix& descriptors, const DescriptorSpace& space = {},
+                             MatchKernel kernel = FastestKernel());
 
   // Number of descriptors.
   int size() const { return static_cast<int>(small_.idx.size() + other_.idx.size()); }
   MatchKernel kernel() const { return kernel_; }
+  const DescriptorSpace& space() const { return space_; }
   // Memory that it holds, bytes.
   int64_t num_bytes() const;
-  // Upper limit of the bytes that `num_descriptors` packed descriptors take, for any kernel: for
-  // memory budgets.
-  static int64_t NumBytes(int64_t num_descriptors) { return 160 * num_descriptors + 16384; }
+  // Upper limit of the bytes that `num_descriptors` packed descriptors of so many values take, for any
+  // kernel: for memory budgets.
+  static int64_t NumBytes(int64_t num_descriptors, int num_values) {
+    const int64_t padded = (num_values + 3) / 4 * 4;
+    return (padded + 32) * num_descriptors + 128 * padded;
+  }
 
   // Those that the kernel for small values may take (none if there is no such kernel), and the others.
   const DescriptorBlock& small() const { return small_; }
@@ -73,9 +79,13 @@ class PackedDescriptors {
 
  private:
   MatchKernel kernel_ = MatchKernel::kPortable;
+  DescriptorSpace space_;
   DescriptorBlock small_;
   DescriptorBlock other_;
 };
+
+// Words of four values that a packed descriptor has.
+inline int NumChunks(const DescriptorSpace& space) { return (space.num_values + 3) / 4; }
 
 // The kernel for any values, and the one for small values (null where the first is as fast).
 const BestTwoKernel& KernelForAll(MatchKernel kernel);

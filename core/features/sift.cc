@@ -13,7 +13,7 @@ namespace {
 
 // No keypoint is in the 5 pixels at the border of the doubled image.
 constexpr int kMinImageSide = 6;
-static_assert(kSiftDim == kDescriptorDim);
+static_assert(kSiftDim == kSiftDescriptorDim);
 
 // Least scale of octave 1: half a layer above its level 0.
 constexpr double kOctaveOneScalePx = 1.7959392773;  // 1.6 * 2^(1/6)
@@ -29,7 +29,7 @@ using IsWanted = std::function<bool(const Keypoint&)>;
 Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask, SiftSearch search,
                  const IsWanted& is_wanted) {
   Features features;
-  features.descriptors.resize(0, kDescriptorDim);
+  features.descriptors.resize(0, kSiftDescriptorDim);
   if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
   search.max_num_features = options.max_num_features;
   search.contrast_threshold = options.contrast_threshold;
@@ -40,7 +40,7 @@ Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat&
     };
   }
   const std::vector<SiftFeature> found = FindSift(grey, mask, search);
-  features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kDescriptorDim);
+  features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kSiftDescriptorDim);
   features.keypoints.reserve(found.size());
   for (const SiftFeature& feature : found) {
     std::copy(feature.root_sift.begin(), feature.root_sift.end(),

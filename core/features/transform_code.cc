@@ -28,7 +28,7 @@ constexpr std::array<std::array<int64_t, kNumOrientations>, kNumOrientations> kF
     {1448, -1448, 1448, -1448, 1448, -1448, 1448, -1448},
 }};
 
-using Values = std::array<int64_t, kDescriptorDim>;
+using Values = std::array<int64_t, kSiftDescriptorDim>;
 
 // One axis of a separable transform or, transposed, of its inverse: `stride` values lie between two of it.
 template <size_t kSize>
@@ -92,7 +92,7 @@ TransformCode QuantizeByTransform(int step, DescriptorMatrix* descriptors) {
   TransformCode code{.step = step};
   const Eigen::Index count = descriptors->rows();
   if (count == 0) return code;
-  for (int i = 0; i < kDescriptorDim; ++i) {
+  for (int i = 0; i < kSiftDescriptorDim; ++i) {
     const int64_t sum = descriptors->col(i).cast<int64_t>().sum();
     code.mean[i] = static_cast<uint8_t>((sum + count / 2) / count);
   }
@@ -102,7 +102,7 @@ TransformCode QuantizeByTransform(int step, DescriptorMatrix* descriptors) {
 
 void QuantizeByCode(const TransformCode& code, DescriptorMatrix* descriptors) {
   for (Eigen::Index row = 0; row < descriptors->rows(); ++row) {
-    uint8_t* descriptor = descriptors->data() + row * kDescriptorDim;
+    uint8_t* descriptor = descriptors->data() + row * kSiftDescriptorDim;
     TransformLevels levels = LevelsOf(descriptor, code);
     // Values cut off at 0 or 255 change coefficients: usually by less than a level.
     for (int round = 0; round < kMaxNumRounds; ++round) {

@@ -15,17 +15,17 @@ namespace cairn {
 // descriptor everywhere.
 struct TransformCode {
   int step = 24;  // of a coefficient's levels, in units of a descriptor's values.  REQUIRES: in [1, 255]
-  std::array<uint8_t, kDescriptorDim> mean = {};  // that codes of 0 alone stand for
+  std::array<uint8_t, kSiftDescriptorDim> mean = {};  // that codes of 0 alone stand for
   friend bool operator==(const TransformCode&, const TransformCode&) = default;
 };
 
 // Numbers of coefficients' levels, 0 the level around 0.  Coefficient (8 (4 v + u) + f) has frequency v in y,
 // u in x; f: 0, cos and sin of 1, of 2, of 3, and 4 periods in 360 degrees.
-using TransformLevels = std::array<int16_t, kDescriptorDim>;
+using TransformLevels = std::array<int16_t, kSiftDescriptorDim>;
 
 // The levels of a descriptor's coefficients: nearest, except that a level more takes 0.58 of a step, which
 // makes more of them 0 [Sullivan, "Efficient scalar quantization of exponential and Laplacian random
-// variables", 1996].  `descriptor`, of kDescriptorDim values.
+// variables", 1996].  `descriptor`, of kSiftDescriptorDim values.
 TransformLevels LevelsOf(const uint8_t* descriptor, const TransformCode& code);
 // The descriptor that levels stand for.
 void DescriptorOf(const TransformLevels& levels, const TransformCode& code, uint8_t* descriptor);

@@ -137,6 +137,7 @@ Status MapFile::ReadHead(SQLite::Database& database, const MapFileOptions& optio
   Result<MapDirectory> directory = MapDirectory::Decode(entries, num_bytes_);
   if (!directory.ok()) return Corrupt(path_, "{}", directory.error().message);
   directory_ = std::move(*directory);
+  directory_.set_descriptor_kind(head_.descriptor_kind);
   return Ok();
 }
 

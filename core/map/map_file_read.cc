@@ -16,8 +16,9 @@ class RowsReader {
     const MapDirectory& directory = file_.directory();
     rows_.regions.resize(directory.Count(BlockKind::kRegions));
     // Packed landmarks can take few bytes: what they decode to is limited before it is allocated.
-    if (directory.Count(BlockKind::kLandmarks) * kDescriptorDim > num_bytes_left_) return TooMuch();
-    rows_.descriptors.resize(directory.Count(BlockKind::kLandmarks), kDescriptorDim);
+    if (directory.Count(BlockKind::kLandmarks) * file_.head().descriptor_kind.num_values > num_bytes_left_)
+      return TooMuch();
+    rows_.descriptors.resize(directory.Count(BlockKind::kLandmarks), file_.head().descriptor_kind.num_values);
     rows_.landmarks.reserve(directory.Count(BlockKind::kLandmarks));
     for (int64_t block = 0; block < static_cast<int64_t>(directory.blocks().size()); ++block) {
       CAIRN_RETURN_IF_ERROR(ReadBlock(block, directory.blocks()[block]));

@@ -5,6 +5,7 @@
 
 #include "core/base/blob.h"
 #include "core/base/text.h"
+#include "core/features/features.h"
 
 namespace cairn {
 namespace {
@@ -144,6 +145,11 @@ Status DecodeMeta(Texts meta, const std::string& path, MapHead* head) {
                    meta["seed"], meta["k"], meta["tau"], meta["rho"]);
   }
   if (meta.count("documents")) head->documents = meta["documents"];
+  if (meta.count("descriptors")) {
+    const Result<DescriptorKind> kind = ParseDescriptorKind(meta["descriptors"]);
+    if (!kind.ok()) return Corrupt(path, "table meta: {}", kind.error().message);
+    head->descriptor_kind = *kind;
+  }
   if (meta.count("lower_bound")) {
     head->lower_bound.emplace();
     if (!ParseNumber(meta["lower_bound"], &*head->lower_bound) ||
@@ -229,6 +235,11 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
   if (!head.instruction_set.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"instruction_set", head.instruction_set}});
   }
+  if (!head.descriptor_kind.is_sift()) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"descriptors", ToString(head.descriptor_kind)}});
+    // Programs that know SIFT alone refuse the map.
+    database.exec(fmt::format("PRAGMA user_version = {}", 1000 * kMapVersionOfKinds + kMapVersionMinor));
+  }
   if (head.documents != "all") {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"documents", head.documents}});
   }
@@ -302,15 +313,17 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
   }
   const int version = database.execAndGet("PRAGMA user_version").getInt();
   const int found = version / 1000;
-  if (found == major) return Ok();
+  if (found == major || (major == kMapVersionMajor && found == kMapVersionOfKinds)) return Ok();
   std::string writer = "an unknown program";
   if (HasTable(database, "meta")) {
     SQLite::Statement query(database, "SELECT value FROM meta WHERE key = 'writer'");
     if (query.executeStep()) writer = query.getColumn(0).getString();
   }
   return MakeError(found > major ? ErrorCode::kTooNew : ErrorCode::kTooOld,
-                   "{}: map version {}.{}, written by {}; {}.x is read here. {}", path, found, version % 1000,
-                   writer, major,
+                   "{}: map version {}.{}, written by {}; {} is read here. {}", path, found, version % 1000,
+                   writer,
+                   major == kMapVersionMajor ? fmt::format("{}.x and {}.x", major, kMapVersionOfKinds)
+                                             : fmt::format("{}.x", major),
                    found > major ? "Update the program, or compile the map with this one."
                                  : "Convert it with `cairn migrate`, or compile the map again.");
 }

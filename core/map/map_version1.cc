@@ -92,7 +92,7 @@ Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRow
   const int64_t num_landmarks = database.execAndGet("SELECT count(*) FROM landmarks").getInt64();
   if (num_landmarks > INT32_MAX) return Corrupt(path, "{} landmarks", num_landmarks);
   rows->landmarks.reserve(num_landmarks);
-  rows->descriptors.resize(num_landmarks, kDescriptorDim);
+  rows->descriptors.resize(num_landmarks, kSiftDescriptorDim);
   SQLite::Statement query(
       database,
       "SELECT landmark_idx, class_id, x, y, z, scale, num_observations, covariance, descriptor FROM "
@@ -115,7 +115,7 @@ Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRow
         landmark.covariance(row, col) = landmark.covariance(col, row) = reader.Float32();
     }
     const std::string_view descriptor = BlobView(query.getColumn(8));
-    if (!reader.Finished() || descriptor.size() != kDescriptorDim) {
+    if (!reader.Finished() || descriptor.size() != kSiftDescriptorDim) {
       return Corrupt(path,
                      "landmark {}: a covariance of {} and a descriptor of {} bytes, expected 24 and 128",
                      landmark_idx, query.getColumn(7).getBytes(), descriptor.size());

@@ -110,7 +110,7 @@ struct Models {
   // By coefficient and by how large those around it are, 0 to 2: whether the level is 0, its sign, and
   // whether it is more than 1, 2, ...
   static constexpr int kNumSteps = 14;
-  std::array<std::array<std::array<AdaptiveBit, kNumSteps + 2>, 3>, kDescriptorDim> levels;
+  std::array<std::array<std::array<AdaptiveBit, kNumSteps + 2>, 3>, kSiftDescriptorDim> levels;
   AdaptiveNumber large_level;
 };
 
@@ -122,9 +122,9 @@ int64_t CodeSigned(Coder& coder, AdaptiveNumber* number, AdaptiveBit* sign, int6
 }
 
 // Coefficients in the order of their frequencies, so that those around one are mostly known.
-std::array<int, kDescriptorDim> CoefficientOrder() {
-  std::array<int, kDescriptorDim> order;
-  for (int i = 0; i < kDescriptorDim; ++i) order[i] = i;
+std::array<int, kSiftDescriptorDim> CoefficientOrder() {
+  std::array<int, kSiftDescriptorDim> order;
+  for (int i = 0; i < kSiftDescriptorDim; ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(), [](int a, int b) { return FrequencyOf(a) < FrequencyOf(b); });
   return order;
 }
@@ -147,7 +147,7 @@ int SizeAround(const TransformLevels& levels, int coefficient) {
 
 // False where a level is too large for a descriptor.
 template <typename Coder>
-bool CodeLevels(Coder& coder, const std::array<int, kDescriptorDim>& order, int step, Models* models,
+bool CodeLevels(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, int step, Models* models,
                 TransformLevels* levels) {
   constexpr int64_t kMaxCoefficient = 4096;  // of a descriptor: below 255 sqrt(128)
   for (const int coefficient : order) {
@@ -234,19 +234,19 @@ void CodeLandmark(Coder& coder, const std::array<int64_t, 3>& middle, int64_t pr
 }
 
 template <typename Coder>
-bool CodeDescriptor(Coder& coder, const std::array<int, kDescriptorDim>& order, const TransformCode& code,
+bool CodeDescriptor(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, const TransformCode& code,
                     Models* models, uint8_t* descriptor) {
   constexpr int kBitsPerValue = 8;
   TransformLevels levels = {};
   bool is_exact = true;
   if constexpr (std::is_same_v<Coder, RangeEncoder>) {
     levels = LevelsOf(descriptor, code);
-    std::array<uint8_t, kDescriptorDim> stands_for;
+    std::array<uint8_t, kSiftDescriptorDim> stands_for;
     DescriptorOf(levels, code, stands_for.data());
     is_exact = std::equal(stands_for.begin(), stands_for.end(), descriptor);
   }
   if (coder.Bit(&models->is_stored_whole, !is_exact)) {
-    for (int i = 0; i < kDescriptorDim; ++i)
+    for (int i = 0; i < kSiftDescriptorDim; ++i)
       descriptor[i] = static_cast<uint8_t>(coder.Bits(kBitsPerValue, descriptor[i]));
     return true;
   }
@@ -279,8 +279,8 @@ class LandmarksCoder {
   void Encode(PackedLandmark landmark, const DescriptorMatrix& descriptors, size_t row, RangeEncoder* coder) {
     CodeLandmark(*coder, middle_, class_id_, models_.get(), &landmark);
     class_id_ = landmark.class_id;
-    std::array<uint8_t, kDescriptorDim> descriptor;
-    std::copy_n(descriptors.data() + row * kDescriptorDim, kDescriptorDim, descriptor.begin());
+    std::array<uint8_t, kSiftDescriptorDim> descriptor;
+    std::copy_n(descriptors.data() + row * kSiftDescriptorDim, kSiftDescriptorDim, descriptor.begin());
     CodeDescriptor(*coder, order_, code_, models_.get(), descriptor.data());
   }
 
@@ -288,14 +288,14 @@ class LandmarksCoder {
   bool DecodeAll(std::string_view bytes, size_t num, std::vector<MapLandmark>* landmarks,
                  DescriptorMatrix* descriptors) {
     landmarks->assign(num, {});
-    *descriptors = DescriptorMatrix::Zero(static_cast<Eigen::Index>(num), kDescriptorDim);
+    *descriptors = DescriptorMatrix::Zero(static_cast<Eigen::Index>(num), kSiftDescriptorDim);
     RangeDecoder coder(bytes);
     for (size_t i = 0; i < num && coder.ok(); ++i) {
       PackedLandmark packed;
       CodeLandmark(coder, middle_, class_id_, models_.get(), &packed);
       class_id_ = packed.class_id;
       if (!UnpackLandmark(packed, &(*landmarks)[i])) return false;
-      if (!CodeDescriptor(coder, order_, code_, models_.get(), descriptors->data() + i * kDescriptorDim))
+      if (!CodeDescriptor(coder, order_, code_, models_.get(), descriptors->data() + i * kSiftDescriptorDim))
         return false;
     }
     return coder.Finished();
@@ -306,7 +306,7 @@ class LandmarksCoder {
   Middle middle_;
   int64_t class_id_ = 0;
   std::unique_ptr<Models> models_ = std::make_unique<Models>();
-  std::array<int, kDescriptorDim> order_ = CoefficientOrder();
+  std::array<int, kSiftDescriptorDim> order_ = CoefficientOrder();
 };
 
 std::vector<PackedLandmark> PackEach(const std::vector<MapLandmark>& landmarks, size_t num) {

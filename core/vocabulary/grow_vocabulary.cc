@@ -29,8 +29,8 @@ Status GrowTree(const DescriptorMatrix& training, const GrowVocabularyOptions& o
   std::vector<std::vector<int32_t>> level(1);  // members of the nodes of the current level
   level[0].resize(training.rows());
   std::iota(level[0].begin(), level[0].end(), 0);
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> centres(1);
-  centres[0].setZero();
+  const DescriptorSpace space = vocabulary->kind.space();
+  std::vector<DescriptorRow> centres(1, DescriptorRow::Zero(space.num_values));
   vocabulary->nodes.resize(1);
   size_t first_node = 0;  // of the level
   progress.Begin("training vocabulary", training.rows() * vocabulary->depth, "descriptors");
@@ -41,7 +41,7 @@ Status GrowTree(const DescriptorMatrix& training, const GrowVocabularyOptions& o
     ParallelFor(static_cast<int64_t>(level.size()), parallel_nodes ? num_threads : 1, [&](int64_t i) {
       const int64_t num_members = static_cast<int64_t>(level[i].size());
       if (!progress.Cancelled() && (depth == 0 || num_members >= options.min_num_descriptors_to_split)) {
-        children[i] = SplitNode(training, level[i], options.branching, options.max_num_iterations,
+        children[i] = SplitNode(training, space, level[i], options.branching, options.max_num_iterations,
                                 MixSeed(seed, kFirstNodeStream + first_node + static_cast<uint64_t>(i)),
                                 parallel_nodes ? 1 : num_threads);
       }
@@ -61,17 +61,18 @@ Status GrowTree(const DescriptorMatrix& training, const GrowVocabularyOptions& o
     vocabulary->nodes.resize(centres.size());
   }
   progress.End();
-  vocabulary->centres.resize(static_cast<Eigen::Index>(centres.size()), kDescriptorDim);
+  vocabulary->centres.resize(static_cast<Eigen::Index>(centres.size()), space.num_values);
   for (size_t i = 0; i < centres.size(); ++i) vocabulary->centres.row(i) = centres[i];
   return NumberVocabularyNodes(vocabulary);
 }
 
 }  // namespace
 
-Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, int64_t num_descriptors,
-                                  const GrowVocabularyOptions& options, uint64_t seed, int num_threads,
-                                  Progress& progress) {
+Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, const DescriptorKind& kind,
+                                  int64_t num_descriptors, const GrowVocabularyOptions& options,
+                                  uint64_t seed, int num_threads, Progress& progress) {
   Vocabulary vocabulary;
+  vocabulary.kind = kind;
   vocabulary.branching = options.branching;
   vocabulary.depth = options.depth > 0 ? options.depth : DepthFromCount(num_descriptors, options);
   CAIRN_RETURN_IF_ERROR(GrowTree(training, options, seed, num_threads, progress, &vocabulary));

@@ -32,8 +32,8 @@ struct GrowVocabularyOptions {
 // The same for any number of threads: all sums are of integers.  If all descriptors are equal, the tree is
 // one word; with fewer distinct descriptors than branches, each is a word.  Cost: training descriptors *
 // depth * rounds * branching dot products.  Errors: Cancelled.
-Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, int64_t num_descriptors,
-                                  const GrowVocabularyOptions& options, uint64_t seed, int num_threads,
-                                  Progress& progress);
+Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, const DescriptorKind& kind,
+                                  int64_t num_descriptors, const GrowVocabularyOptions& options,
+                                  uint64_t seed, int num_threads, Progress& progress);
 
 }  // namespace cairn

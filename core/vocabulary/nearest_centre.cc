@@ -1,8 +1,9 @@
 #include "core/vocabulary/nearest_centre.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 
-#include "core/features/descriptor_distance.h"
 #include "core/features/wide_clones.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -12,11 +13,22 @@
 namespace cairn {
 namespace {
 
-int NearestCentrePortable(const uint8_t* centres, int num_centres, const uint8_t* descriptor) {
+// Of (c - o) (x - o) summed over the values, only c (x - o) depends on the centre.
+CAIRN_WIDE_CLONES int32_t DotWithCentred(const uint8_t* centre, const int16_t* centred, int num_values) {
+  int32_t dot = 0;
+  for (int d = 0; d < num_values; ++d) dot += static_cast<int32_t>(centre[d]) * centred[d];
+  return dot;
+}
+
+int NearestCentrePortable(const uint8_t* centres, int num_centres, const uint8_t* descriptor,
+                          const DescriptorSpace& space) {
+  std::array<int16_t, kMaxDescriptorDim> centred;
+  for (int d = 0; d < space.num_values; ++d) centred[d] = static_cast<int16_t>(descriptor[d] - space.offset);
   int nearest = 0;
-  int32_t largest = -1;
+  int32_t largest = std::numeric_limits<int32_t>::min();
   for (int i = 0; i < num_centres; ++i) {
-    const int32_t dot = DescriptorDot(centres + static_cast<size_t>(i) * kDescriptorDim, descriptor);
+    const int32_t dot =
+        DotWithCentred(centres + static_cast<size_t>(i) * space.num_values, centred.data(), space.num_values);
     if (dot > largest) {
       largest = dot;
       nearest = i;
@@ -26,7 +38,7 @@ int NearestCentrePortable(const uint8_t* centres, int num_centres, const uint8_t
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
-constexpr int kNumVectors = kDescriptorDim / 16;
+constexpr int kNumVectors = kSiftDescriptorDim / 16;  // others take the portable way
 
 __attribute__((target("avx2"))) inline __m256i Widen(const uint8_t* values) {
   return _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(values)));
@@ -61,7 +73,7 @@ __attribute__((target("avx2"))) int NearestCentreAvx2(const uint8_t* centres, in
     const int count = std::min(4, num_centres - first);
     for (int k = 0; k < 4; ++k) {
       const int centre = first + std::min(k, count - 1);
-      partial[k] = PartialDots(centres + static_cast<size_t>(centre) * kDescriptorDim, wide);
+      partial[k] = PartialDots(centres + static_cast<size_t>(centre) * kSiftDescriptorDim, wide);
     }
     int32_t dots[4];
     Sum4(partial[0], partial[1], partial[2], partial[3], dots);
@@ -78,24 +90,25 @@ __attribute__((target("avx2"))) int NearestCentreAvx2(const uint8_t* centres, in
 
 }  // namespace
 
-int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor) {
+int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor,
+                  const DescriptorSpace& space) {
 #if defined(__x86_64__) && defined(__GNUC__)
   static const bool has_avx2 = __builtin_cpu_supports("avx2") != 0;
-  if (has_avx2) return NearestCentreAvx2(centres, num_centres, descriptor);
+  if (has_avx2 && space == DescriptorSpace()) return NearestCentreAvx2(centres, num_centres, descriptor);
 #endif
-  return NearestCentrePortable(centres, num_centres, descriptor);
+  return NearestCentrePortable(centres, num_centres, descriptor, space);
 }
 
-CAIRN_WIDE_CLONES void AddDescriptor(const uint8_t* descriptor, int32_t* sums) {
-  for (int d = 0; d < kDescriptorDim; ++d) sums[d] += descriptor[d];
+CAIRN_WIDE_CLONES void AddDescriptor(const uint8_t* descriptor, int num_values, int32_t* sums) {
+  for (int d = 0; d < num_values; ++d) sums[d] += descriptor[d];
 }
 
 CAIRN_WIDE_CLONES void LowerSquaredDistances(const uint8_t* descriptors, int64_t num_descriptors,
-                                             const uint8_t* centre, int32_t* nearest) {
+                                             const uint8_t* centre, int num_values, int32_t* nearest) {
   for (int64_t i = 0; i < num_descriptors; ++i) {
-    const uint8_t* descriptor = descriptors + i * kDescriptorDim;
+    const uint8_t* descriptor = descriptors + i * num_values;
     int32_t sum = 0;
-    for (int d = 0; d < kDescriptorDim; ++d) {
+    for (int d = 0; d < num_values; ++d) {
       const auto difference = static_cast<int16_t>(descriptor[d] - centre[d]);
       sum += static_cast<int32_t>(difference) * difference;
     }

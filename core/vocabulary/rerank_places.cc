@@ -104,7 +104,7 @@ PlaceView MakePlaceView(const Features& features, const Camera& camera) {
         BearingFromImage(camera, {keypoint.x, keypoint.y})
             .value_or(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())));
   }
-  view.packed = PackedDescriptors(features.descriptors);
+  view.packed = PackedDescriptors(features.descriptors, features.kind.space());
   view.focal_px = camera.MeanFocal();
   return view;
 }

@@ -1,12 +1,12 @@
 #include "core/vocabulary/split_node.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/features/descriptor_distance.h"
 #include "core/vocabulary/nearest_centre.h"
 
 namespace cairn {
@@ -14,40 +14,33 @@ namespace {
 
 constexpr int64_t kChunk = 4096;  // members a task assigns at a time
 
-using Sums = std::array<int64_t, kDescriptorDim>;
-using ChunkSums = std::array<int32_t, kDescriptorDim>;  // kChunk * 255 fits
+using Sums = std::vector<int64_t>;
+using ChunkSums = std::vector<int32_t>;  // kChunk * 255 fits
 using DescriptorRows = Eigen::Ref<const DescriptorMatrix>;
 
-// The direction of a sum of descriptors, quantised like a descriptor.
-Eigen::Matrix<uint8_t, 1, kDescriptorDim> CentreFromSums(const Sums& sums) {
-  double squared_norm = 0;
-  for (const int64_t sum : sums) squared_norm += static_cast<double>(sum) * static_cast<double>(sum);
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> centre = Eigen::Matrix<uint8_t, 1, kDescriptorDim>::Zero();
-  if (squared_norm == 0) return centre;
-  const double scale = 512.0 / std::sqrt(squared_norm);
-  for (int i = 0; i < kDescriptorDim; ++i) {
-    centre[i] = static_cast<uint8_t>(std::min(255.0, std::round(static_cast<double>(sums[i]) * scale)));
-  }
-  return centre;
+// The direction of a sum of so many descriptors, quantised like a descriptor.
+DescriptorRow CentreFromSums(const Sums& sums, int64_t num, const DescriptorSpace& space) {
+  const Eigen::Map<const Eigen::Matrix<int64_t, 1, Eigen::Dynamic>> sum(
+      sums.data(), static_cast<Eigen::Index>(sums.size()));
+  return MeanDescriptor(sum.cast<double>(), num, space);
 }
 
 // k-means++: each next seed is drawn with a probability proportional to the squared distance from the
 // nearest one.
-DescriptorMatrix DrawSeeds(const DescriptorRows& members, int num_seeds, uint64_t seed, int num_threads) {
+DescriptorMatrix DrawSeeds(const DescriptorRows& members, const DescriptorSpace& space, int num_seeds,
+                           uint64_t seed, int num_threads) {
   Random random(seed);
   const int64_t num_members = members.rows();
   std::vector<int32_t> nearest(num_members, INT32_MAX);
-  DescriptorMatrix seeds(num_seeds, kDescriptorDim);
+  DescriptorMatrix seeds(num_seeds, members.cols());
   int64_t chosen = random.UniformInt(0, num_members - 1);
   for (int k = 0; k < num_seeds; ++k) {
     const uint8_t* seed_descriptor = members.row(chosen).data();
-    Sums sums = {};
-    std::copy_n(seed_descriptor, kDescriptorDim, sums.begin());
-    seeds.row(k) = CentreFromSums(sums);
+    seeds.row(k) = CentreFromSums(Sums(seed_descriptor, seed_descriptor + members.cols()), 1, space);
     ParallelFor((num_members + kChunk - 1) / kChunk, num_threads, [&](int64_t chunk) {
       const int64_t first = chunk * kChunk;
       LowerSquaredDistances(members.row(first).data(), std::min(kChunk, num_members - first), seed_descriptor,
-                            nearest.data() + first);
+                            space.num_values, nearest.data() + first);
     });
     const int64_t total = std::accumulate(nearest.begin(), nearest.end(), int64_t{0});
     if (total == 0) return seeds.topRows(k + 1);  // every member equals a seed
@@ -59,7 +52,7 @@ DescriptorMatrix DrawSeeds(const DescriptorRows& members, int num_seeds, uint64_
 
 // Copies the members side by side in memory, since all rounds run over them.
 DescriptorMatrix Gather(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members) {
-  DescriptorMatrix gathered(static_cast<Eigen::Index>(members.size()), kDescriptorDim);
+  DescriptorMatrix gathered(static_cast<Eigen::Index>(members.size()), descriptors.cols());
   for (size_t i = 0; i < members.size(); ++i) {
     gathered.row(static_cast<Eigen::Index>(i)) = descriptors.row(members[i]);
   }
@@ -68,15 +61,16 @@ DescriptorMatrix Gather(const DescriptorMatrix& descriptors, const std::vector<i
 
 }  // namespace
 
-std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members,
-                                 int branching, int max_num_iterations, uint64_t seed, int num_threads) {
+std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const DescriptorSpace& space,
+                                 const std::vector<int32_t>& members, int branching, int max_num_iterations,
+                                 uint64_t seed, int num_threads) {
   const int64_t num_members = static_cast<int64_t>(members.size());
   if (num_members < 2) return {};
   const int num_seeds = static_cast<int>(std::min<int64_t>(branching, num_members));
   DescriptorMatrix copies;
   if (num_members != descriptors.rows()) copies = Gather(descriptors, members);
   const DescriptorRows rows(num_members != descriptors.rows() ? copies : descriptors);
-  DescriptorMatrix centres = DrawSeeds(rows, num_seeds, seed, num_threads);
+  DescriptorMatrix centres = DrawSeeds(rows, space, num_seeds, seed, num_threads);
   const int num_centres = static_cast<int>(centres.rows());
   const int64_t num_chunks = (num_members + kChunk - 1) / kChunk;
   std::vector<int32_t> nearest(members.size(), -1);
@@ -85,14 +79,14 @@ std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std:
     std::vector<std::vector<ChunkSums>> sums(num_chunks);
     std::vector<char> changed(num_chunks, 0);
     ParallelFor(num_chunks, num_threads, [&](int64_t chunk) {
-      sums[chunk].resize(num_centres);  // value-initialised: zeros
+      sums[chunk].assign(num_centres, ChunkSums(space.num_values, 0));
       for (int64_t i = chunk * kChunk; i < std::min(num_members, (chunk + 1) * kChunk); ++i) {
         const uint8_t* descriptor = rows.row(i).data();
         // [Mariottini11 §IV] k-means, one level of it; on directions instead of distances
-        const int centre = NearestCentre(centres.data(), num_centres, descriptor);
+        const int centre = NearestCentre(centres.data(), num_centres, descriptor, space);
         changed[chunk] |= centre != nearest[i];
         nearest[i] = centre;
-        AddDescriptor(descriptor, sums[chunk][centre].data());
+        AddDescriptor(descriptor, space.num_values, sums[chunk][centre].data());
       }
     });
     counts.assign(num_centres, 0);
@@ -102,11 +96,11 @@ std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std:
       break;
     for (int k = 0; k < num_centres; ++k) {
       if (counts[k] == 0) continue;  // keeps its place; pruned if it stays empty
-      Sums sum = {};
+      Sums sum(space.num_values, 0);
       for (const std::vector<ChunkSums>& chunk : sums) {
-        for (int i = 0; i < kDescriptorDim; ++i) sum[i] += chunk[k][i];
+        for (int i = 0; i < space.num_values; ++i) sum[i] += chunk[k][i];
       }
-      centres.row(k) = CentreFromSums(sum);
+      centres.row(k) = CentreFromSums(sum, counts[k], space);
     }
   }
 

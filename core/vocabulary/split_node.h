@@ -7,9 +7,9 @@
 
 namespace cairn {
 
-// Descriptors of one child of a split node, and its centre (squared norm near 512^2).
+// Descriptors of one child of a split node, and its centre, of a descriptor's norm.
 struct NodeChild {
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> centre;
+  DescriptorRow centre;
   std::vector<int32_t> members;  // rows of `descriptors`, ascending
 };
 
@@ -17,7 +17,8 @@ struct NodeChild {
 // seeds far from each other (k-means++), then at most `max_num_iterations` rounds.  Clusters that end empty
 // are pruned; no child at all when the members cannot be split (all equal in direction).  Members are copied
 // together, unless they are all rows.  REQUIRES: members ascending, each once
-std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members,
-                                 int branching, int max_num_iterations, uint64_t seed, int num_threads);
+std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const DescriptorSpace& space,
+                                 const std::vector<int32_t>& members, int branching, int max_num_iterations,
+                                 uint64_t seed, int num_threads);
 
 }  // namespace cairn

@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "core/base/blob.h"
+#include "core/features/descriptor_kind_table.h"
 #include "core/vocabulary/vocabulary_tree.h"
 #include "schemas/vocabulary_sql.h"
 
@@ -18,6 +19,7 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
                  Vocabulary* vocabulary) {
   std::vector<std::pair<int64_t, std::string>> rows;
   vocabulary->nodes.resize(num_nodes);
+  const int num_values = vocabulary->kind.num_values;
   SQLite::Statement query(database,
                           "SELECT node_id, num_children, centres FROM vocabulary_nodes ORDER BY node_id");
   while (query.executeStep()) {
@@ -25,7 +27,7 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
     const int64_t num_children = query.getColumn(1).getInt64();
     const std::string_view centres = BlobView(query.getColumn(2));
     if (node_id < 0 || node_id >= num_nodes || num_children < 1 || num_children > num_nodes ||
-        static_cast<int64_t>(centres.size()) != num_children * kDescriptorDim) {
+        static_cast<int64_t>(centres.size()) != num_children * num_values) {
       return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_nodes {}: {} children with {} bytes of centres",
                        path, node_id, num_children, centres.size());
     }
@@ -35,7 +37,7 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
   if (Status status = NumberVocabularyNodes(vocabulary); !status.ok()) {
     return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);
   }
-  vocabulary->centres = DescriptorMatrix::Zero(num_nodes, kDescriptorDim);
+  vocabulary->centres = DescriptorMatrix::Zero(num_nodes, num_values);
   for (const auto& [node_id, centres] : rows) {
     std::memcpy(vocabulary->centres.row(vocabulary->nodes[node_id].first_child).data(), centres.data(),
                 centres.size());
@@ -102,6 +104,7 @@ Result<Vocabulary> ReadVocabularyTables(SQLite::Database& database, const std::s
                      "{}: has no table 'vocabulary'; expected what build-vocabulary writes", path);
   }
   Vocabulary vocabulary;
+  CAIRN_ASSIGN_OR_RETURN(vocabulary.kind, ReadDescriptorKind(database, path));
   SQLite::Statement head(database,
                          "SELECT branching, depth, num_nodes, num_words, num_documents FROM vocabulary");
   if (!head.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table 'vocabulary' is empty", path);
@@ -126,6 +129,7 @@ Result<Vocabulary> ReadVocabularyTables(SQLite::Database& database, const std::s
 }
 
 void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabulary) {
+  WriteDescriptorKind(database, vocabulary.kind);
   SQLite::Statement head(database, "INSERT INTO vocabulary VALUES (?, ?, ?, ?, ?)");
   head.bind(1, vocabulary.branching);
   head.bind(2, vocabulary.depth);
@@ -140,7 +144,8 @@ void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabul
     if (node.num_children == 0) continue;
     insert_node.bind(1, static_cast<int64_t>(i));
     insert_node.bind(2, node.num_children);
-    insert_node.bind(3, vocabulary.centres.row(node.first_child).data(), node.num_children * kDescriptorDim);
+    insert_node.bind(3, vocabulary.centres.row(node.first_child).data(),
+                     node.num_children * vocabulary.kind.num_values);
     insert_node.exec();
     insert_node.reset();
   }

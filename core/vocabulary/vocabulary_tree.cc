@@ -62,10 +62,12 @@ WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descript
   if (vocabulary.nodes.empty()) return -1;
   // [Mariottini11 §IV] the leaf that a descriptor's path ends at is its word
   const VocabularyNode* node = &vocabulary.nodes[0];
+  const DescriptorSpace space = vocabulary.kind.space();
   while (node->num_children > 0) {
     const uint8_t* centres =
-        vocabulary.centres.data() + static_cast<size_t>(node->first_child) * kDescriptorDim;
-    node = &vocabulary.nodes[node->first_child + NearestCentre(centres, node->num_children, descriptor)];
+        vocabulary.centres.data() + static_cast<size_t>(node->first_child) * space.num_values;
+    node =
+        &vocabulary.nodes[node->first_child + NearestCentre(centres, node->num_children, descriptor, space)];
   }
   return node->word;
 }

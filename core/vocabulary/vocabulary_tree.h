@@ -33,7 +33,8 @@ struct Vocabulary {
   int branching = 0;
   int depth = 0;
   std::vector<VocabularyNode> nodes;
-  DescriptorMatrix centres;  // row i: centre of node i, squared norm near 512^2 (row 0 unused)
+  DescriptorKind kind;       // of the descriptors whose words these are
+  DescriptorMatrix centres;  // row i: centre of node i, of a descriptor's norm (row 0 unused)
   std::vector<std::vector<Posting>> inverted_files;  // per word, ascending document; empty for a stopped word
   std::vector<ImageId> document_ids;                 // ascending
 

@@ -72,7 +72,7 @@ Result<Features> AffordableFineSift(const cv::Mat& grey, const SiftOptions& opti
                                     const std::function<bool(const Keypoint&)>& is_wanted,
                                     int64_t of_feature_ps, WorkBudget* work) {
   Features none;
-  none.descriptors.resize(0, kDescriptorDim);
+  none.descriptors.resize(0, kSiftDescriptorDim);
   of_feature_ps += WorkBudget::PicosecondsOf(Work::kFeature);
   const int64_t num_pixels = NumSiftPixels(grey.size(), options);
   const int64_t num_affordable = NumAffordable(work, of_feature_ps, kPart) -

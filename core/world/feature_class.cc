@@ -3,6 +3,7 @@
 #include <array>
 #include <set>
 
+#include "core/features/descriptor_kind_table.h"
 #include "core/files/database.h"
 #include "core/world/dropped_items.h"
 #include "schemas/classes_sql.h"
@@ -42,7 +43,7 @@ Result<std::array<double, N>> ArrayFromColumn(const SQLite::Column& column, cons
 }
 
 Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& path,
-                                  const std::set<ImageId>& image_ids, size_t num_sessions) {
+                                  const std::set<ImageId>& image_ids, size_t num_sessions, int num_values) {
   FeatureClass feature_class;
   feature_class.class_id = row.getColumn(0).getUInt();
   const std::string what = fmt::format("{}: class {}", path, feature_class.class_id);
@@ -52,11 +53,12 @@ Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& pat
   feature_class.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
   feature_class.reprojection_error_px = row.getColumn(3).getDouble();
   const SQLite::Column descriptor = row.getColumn(4);
-  if (descriptor.getBytes() != kDescriptorDim) {
+  if (descriptor.getBytes() != num_values) {
     return MakeError(ErrorCode::kCorrupt, "{}: descriptor of {} bytes, expected {}", what,
-                     descriptor.getBytes(), kDescriptorDim);
+                     descriptor.getBytes(), num_values);
   }
-  std::memcpy(feature_class.descriptor.data(), descriptor.getBlob(), kDescriptorDim);
+  feature_class.descriptor.resize(num_values);
+  std::memcpy(feature_class.descriptor.data(), descriptor.getBlob(), num_values);
   CAIRN_ASSIGN_OR_RETURN(feature_class.observations, BlobToVector<Observation>(row.getColumn(5), what));
   for (const Observation& observation : feature_class.observations) {
     if (image_ids.count(observation.image_id) == 0) {
@@ -75,14 +77,15 @@ Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& pat
 
 Result<std::vector<FeatureClass>> SelectClasses(SQLite::Database& database, const std::string& table,
                                                 const std::string& path, const std::set<ImageId>& image_ids,
-                                                size_t num_sessions) {
+                                                size_t num_sessions, int num_values) {
   std::vector<FeatureClass> classes;
   SQLite::Statement row(database,
                         "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
                         "observations, presence, sightings FROM " +
                             table + " ORDER BY 1");
   while (row.executeStep()) {
-    CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class, ClassFromRow(row, path, image_ids, num_sessions));
+    CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class,
+                           ClassFromRow(row, path, image_ids, num_sessions, num_values));
     classes.push_back(std::move(feature_class));
   }
   return classes;
@@ -98,7 +101,7 @@ void InsertClasses(SQLite::Database& database, const std::string& table,
     BindArray(row, 2, std::array<double, 3>{p.x(), p.y(), p.z()});
     BindArray(row, 3, std::array<double, 6>{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
     row.bind(4, feature_class.reprojection_error_px);
-    row.bind(5, feature_class.descriptor.data(), kDescriptorDim);
+    row.bind(5, feature_class.descriptor.data(), static_cast<int>(feature_class.descriptor.size()));
     row.bind(6, feature_class.observations.data(),
              static_cast<int>(feature_class.observations.size() * sizeof(Observation)));
     row.bind(7, static_cast<double>(feature_class.age.presence));
@@ -204,6 +207,7 @@ Result<std::vector<Camera>> SelectCameras(SQLite::Database& database, const std:
 Status WriteClasses(const Classes& classes, const std::string& path,
                     const std::vector<DroppedItem>& dropped_items) {
   return WriteDatabase(path, kClassesSql, [&](SQLite::Database& database) -> Status {
+    WriteDescriptorKind(database, classes.descriptor_kind);
     InsertCameras(database, "cameras", classes.cameras);
     InsertCameras(database, "stated_cameras", classes.stated_cameras);
     SQLite::Statement image_row(database, "INSERT INTO images VALUES (?, ?, ?, ?, ?)");
@@ -248,12 +252,6 @@ Status WriteClasses(const Classes& classes, const std::string& path) {
   return WriteClasses(classes, path, {});
 }
 
-Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum) {
-  const double norm = sum.norm();
-  if (norm > 0) sum *= 512.0 / norm;
-  return sum.array().round().cwiseMin(255.0).cast<uint8_t>();
-}
-
 Result<Classes> ReadClasses(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<Classes> {
@@ -266,6 +264,8 @@ Result<Classes> ReadClasses(const std::string& path) {
           path);
     }
     Classes classes;
+    CAIRN_ASSIGN_OR_RETURN(classes.descriptor_kind, ReadDescriptorKind(database, path));
+    const int num_values = classes.descriptor_kind.num_values;
     CAIRN_ASSIGN_OR_RETURN(classes.cameras, SelectCameras(database, "cameras", path));
     CAIRN_ASSIGN_OR_RETURN(classes.stated_cameras, SelectCameras(database, "stated_cameras", path));
     std::set<ImageId> image_ids;
@@ -287,10 +287,10 @@ Result<Classes> ReadClasses(const std::string& path) {
     }
     SQLite::Statement session_row(database, "SELECT name FROM sessions ORDER BY session_idx");
     while (session_row.executeStep()) classes.sessions.push_back(session_row.getColumn(0).getString());
-    CAIRN_ASSIGN_OR_RETURN(classes.classes,
-                           SelectClasses(database, "classes", path, image_ids, classes.sessions.size()));
-    CAIRN_ASSIGN_OR_RETURN(classes.vanished,
-                           SelectClasses(database, "vanished", path, image_ids, classes.sessions.size()));
+    CAIRN_ASSIGN_OR_RETURN(classes.classes, SelectClasses(database, "classes", path, image_ids,
+                                                          classes.sessions.size(), num_values));
+    CAIRN_ASSIGN_OR_RETURN(classes.vanished, SelectClasses(database, "vanished", path, image_ids,
+                                                           classes.sessions.size(), num_values));
     CAIRN_ASSIGN_OR_RETURN(classes.changes,
                            SelectChanges(database, path, image_ids, classes.sessions.size()));
     SQLite::Statement alignment_row(

@@ -58,8 +58,8 @@ struct FeatureClass {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
   double reprojection_error_px = 0;                      // root mean square over the observations
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> descriptor = Eigen::Matrix<uint8_t, 1, kDescriptorDim>::Zero();
-  std::vector<Observation> observations;  // ascending image_id, one per image
+  DescriptorRow descriptor = DescriptorRow::Zero(kSiftDescriptorDim);  // of Classes::descriptor_kind
+  std::vector<Observation> observations;                               // ascending image_id, one per image
   ClassAge age;
 };
 
@@ -71,15 +71,12 @@ struct SurveyImage {
   Pose given_cam_from_world;  // as stated by the capture
 };
 
-// The mean of RootSIFT descriptors with this sum, renormalised to norm 512 and rounded.
-using DescriptorSum = Eigen::Matrix<double, 1, kDescriptorDim>;
-Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum);
-
 // How many of something were dropped, and why ("ambiguous", "few_observations", ...).
 using DropCounts = std::map<std::string, int64_t>;
 
 // What group_classes knows of a capture: images in their refined poses, cameras, and the feature classes.
 struct Classes {
+  DescriptorKind descriptor_kind;
   std::vector<Camera> cameras;         // ascending camera_id; intrinsics as refined
   std::vector<Camera> stated_cameras;  // the same as the capture states them, where they are others
   std::vector<SurveyImage>

@@ -8,6 +8,7 @@
 
 #include "core/base/parallel.h"
 #include "core/blocks/map_rows.h"
+#include "core/features/features.h"
 #include "core/files/output_path.h"
 #include "core/map/map_file.h"
 #include "pipeline/atlas/choose_places.h"
@@ -41,14 +42,14 @@ void CodeAll(const CodeBook& book, CodedMaps* maps) {
   for (size_t map = 0; map < maps->rows.size(); ++map) {
     const DescriptorMatrix& descriptors = maps->rows[map].descriptors;
     for (Eigen::Index row = 0; row < descriptors.rows(); ++row)
-      maps->codes[map].push_back(CodeOf(book, descriptors.data() + row * kDescriptorDim));
+      maps->codes[map].push_back(CodeOf(book, descriptors.data() + row * kSiftDescriptorDim));
   }
 }
 
 DescriptorMatrix AllDescriptors(const std::vector<MapRows>& rows) {
   Eigen::Index num = 0;
   for (const MapRows& of_map : rows) num += of_map.descriptors.rows();
-  DescriptorMatrix all(num, kDescriptorDim);
+  DescriptorMatrix all(num, kSiftDescriptorDim);
   Eigen::Index first = 0;
   for (const MapRows& of_map : rows) {
     all.middleRows(first, of_map.descriptors.rows()) = of_map.descriptors;
@@ -129,6 +130,11 @@ Result<AtlasRows> MakeAtlas(const std::vector<std::string>& map_paths, const std
   for (const std::string& path : map_paths) {
     CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
     CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(file));
+    if (!rows.descriptor_kind.is_sift()) {
+      return MakeError(ErrorCode::kUnsupported,
+                       "{}: descriptors of the kind '{}'; an atlas finds places by SIFT's", path,
+                       ToString(rows.descriptor_kind));
+    }
     if (rows.images.empty() || rows.landmarks.empty()) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: map '{}' has {} images and {} landmarks: nothing says "

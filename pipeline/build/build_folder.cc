@@ -294,6 +294,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   }
   CAIRN_ASSIGN_OR_RETURN(const std::string tree, EarlierFile(recipe, "build_vocabulary", "tree_from", paths));
   CAIRN_ASSIGN_OR_RETURN(const std::string previous_map, PreviousMapPath(recipe, paths));
+  CAIRN_ASSIGN_OR_RETURN(const std::string model, EarlierFile(recipe, "extract_features", "model", paths));
   // Before anything is written, names that make cannot read are refused.
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
@@ -319,6 +320,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
   CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
   CAIRN_RETURN_IF_ERROR(config.Set("PREVIOUS_MAP", "[emit_map] previous", {previous_map}));
+  CAIRN_RETURN_IF_ERROR(config.Set("MODEL", "[extract_features] model", {model}));
   if (IsReconstructed(recipe) && !is_registered && !recipe.captures.front().queries_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "queries = \"{}\": held-out images are given with their poses, but {} has none (no "

@@ -22,7 +22,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 endif
 
 # Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SESSIONS_REGISTERED, SIMULATED, RECONSTRUCTED, REGISTERED, KNOWN_PLACES,
-# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, PREVIOUS_MAP, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
+# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, PREVIOUS_MAP, MODEL, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -45,6 +45,7 @@ $(BUILD)/%: SEED := $(SEED)
 $(BUILD)/%: FLOOR_PLAN := $(FLOOR_PLAN)
 $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
 $(BUILD)/%: PREVIOUS_MAP := $(PREVIOUS_MAP)
+$(BUILD)/%: MODEL := $(MODEL)
 
 # ---- The capture's files
 
@@ -65,7 +66,7 @@ POSED_LISTS := $(if $(filter yes,$(REGISTERED)),$(CAPTURE_LISTS) $(wildcard $(CA
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
 -include $(BUILD)/images.d
-# Features of images that have no file: they stand for held-out images, too.
+# Features that the capture has of images: they stand for these, held-out ones, too.
 GIVEN_FEATURES := $(wildcard $(CAPTURE)/features.db $(CAPTURE)/features/*.db)
 # Held-out images that exist, with a backslash before each character that is special to Make.  Only regular files are
 # read: a pipe would block.  Names with backslashes or control characters are left out, because no way of escaping them

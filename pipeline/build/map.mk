@@ -63,9 +63,9 @@ $(BUILD)/capture.stamp: $(BUILD)/options/capture $(PROGRAM_HASH) $(SESSION_LISTS
 endif
 
 # Stage 1: the features of each image; in shards, if there are any.
-CAIRN_EXTRACT = stage extract-features $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) --options $(@D)/options/extract_features.toml
+CAIRN_EXTRACT = stage extract-features $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) --options $(@D)/options/extract_features.toml $(addprefix --model ,$(MODEL))
 FEATURES_INPUTS := $(call CAIRN_OPTIONS,extract_features) $(BUILD)/options/capture $(CAPTURE_STAMP) $(CAPTURE_LISTS) \
-    $(CAPTURE_IMAGES)
+    $(CAPTURE_IMAGES) $(GIVEN_FEATURES) $(MODEL)
 FEATURES_SHARDS := $(call CAIRN_SHARD_STAMPS,features,1)
 $(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call CAIRN_SHARD_RULE,features,1,$(shard),CAIRN_EXTRACT,)))
 $(BUILD)/features.begun: $(FEATURES_INPUTS)
@@ -164,10 +164,10 @@ endif
 
 # Stage 10: held-out or left-out images are localized, and the map is sealed.
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(LEFT_OUT_FOLDER) $(call CAIRN_OPTIONS,check_map) $(SEED_FILE) \
-    $(BUILD)/options/queries $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES) $(if $(QUERIES),$(GIVEN_FEATURES))
+    $(BUILD)/options/queries $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES) $(if $(QUERIES),$(GIVEN_FEATURES)) $(MODEL)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
-	    $(if $(LEFT_OUT_FOLDER),--left-out $(LEFT_OUT_FOLDER) --capture $(POSES)) --options $(@D)/options/check_map.toml --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)
+	    $(if $(LEFT_OUT_FOLDER),--left-out $(LEFT_OUT_FOLDER) --capture $(POSES)) --options $(@D)/options/check_map.toml $(addprefix --model ,$(MODEL)) --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)
 
 # The map in other sizes, for `cairn pareto`: pareto/N.cairn has at most N bytes (0: every class) and pareto/N.json
 # the results of the held-out images; no gate.
@@ -178,6 +178,6 @@ $(BUILD)/pareto/%.unsealed.stamp: $(EMIT_INPUTS)
 $(BUILD)/pareto/%.json: $(BUILD)/pareto/%.unsealed.stamp $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_LAUNCH) $(CAIRN) check $(<:.stamp=) --queries $(QUERIES) --capture $(POSES) \
-	    --options $(@D)/../options/check_map.toml --min-localized-ratio 0 --min-precision-ratio 0 \
+	    --options $(@D)/../options/check_map.toml $(addprefix --model ,$(MODEL)) --min-localized-ratio 0 --min-precision-ratio 0 \
 	    --min-region-localized-ratio 0 --min-region-precision-ratio 0 --plan-must-fit false --json -o $(@:.json=.cairn) \
 	    $(CAIRN_COMMON) > $@

@@ -53,8 +53,8 @@ Command UpdateFamily() {
 std::vector<Command> AllCommands() {
   const std::vector<std::pair<std::string, std::vector<Command>>> groups = {
       {"Maps from surveys",
-       {ImportCommand(), JoinCommand(), CompileCommand(), UpdateMapCommand(), ParetoCommand(), CleanCommand(),
-        StageFamily()}},
+       {ImportCommand(), FeaturesCommand(), JoinCommand(), CompileCommand(), UpdateMapCommand(),
+        ParetoCommand(), CleanCommand(), StageFamily()}},
       {"What a map holds",
        {InspectCommand(), check_map::CheckMapCommand(), ReportCommand(), DiffCommand(), ExportCommand()}},
       {"Where a robot is",

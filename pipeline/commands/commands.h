@@ -11,6 +11,7 @@ namespace cairn::pipeline {
 
 // cairn import SOURCE -o CAPTURE: a public data set's layout, or a COLMAP model, as a capture
 Command ImportCommand();
+Command FeaturesCommand();
 // cairn join NAME=FOLDER... -o FOLDER: several surveys as one capture
 Command JoinCommand();
 // cairn compile RECIPE.toml -o NAME.cairn: splits the recipe into a build folder and lets GNU Make run

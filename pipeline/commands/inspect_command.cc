@@ -14,6 +14,7 @@
 #include "core/atlas/atlas_file.h"
 #include "core/blocks/map_rows.h"
 #include "core/capture/sessions.h"
+#include "core/features/features.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
@@ -156,44 +157,47 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                       [](const MapAppearanceNode& node) { return node.is_kept; });
   for (const MapStation& station : rows.stations) num_uncovered += station.is_covered ? 0 : 1;
   for (const MapRegion& region : rows.regions) num_region_landmarks += region.landmarks.size();
-  nlohmann::ordered_json json = {{"name", rows.name},
-                                 {"format", fmt::format("{}.{}", kMapVersionMajor, file.minor_version())},
-                                 {"writer", rows.writer},
-                                 {"instruction_set", rows.instruction_set},
-                                 {"sealed", rows.sealed},
-                                 {"seed", rows.seed},
-                                 {"unit", rows.frame.unit},
-                                 {"frame_source", rows.frame.source},
-                                 {"scale_sigma_ratio", rows.frame.scale_sigma_ratio},
-                                 {"bytes", num_bytes},
-                                 {"num_landmarks", rows.landmarks.size()},
-                                 {"landmarks", rows.landmark_choice},
-                                 {"num_regions", rows.regions.size()},
-                                 {"lower_bound", nullptr},
-                                 {"uncovered_limit", rows.uncovered_limit},
-                                 {"num_region_landmarks", num_region_landmarks},
-                                 {"algorithm", rows.algorithm},
-                                 {"k", rows.k},
-                                 {"tau", rows.tau},
-                                 {"rho", rows.rho},
-                                 {"num_stations", rows.stations.size()},
-                                 {"num_station_edges", num_edges},
-                                 {"num_uncovered_stations", num_uncovered},
-                                 {"num_images", rows.images.size()},
-                                 {"num_cameras", rows.cameras.size()},
-                                 {"stated_poses_moved_m", rows.stated_pose_sigma_m},
-                                 {"stated_poses_moved_deg", rows.stated_pose_sigma_deg},
-                                 {"covariance_scale", rows.covariance_scale},
-                                 {"keypoint_correlation", rows.keypoint_correlation},
-                                 {"num_appearance_nodes", rows.appearance.size()},
-                                 {"num_kept_nodes", num_kept},
-                                 {"documents", rows.documents},
-                                 {"num_words", rows.vocabulary.num_words()},
-                                 {"vocabulary_depth", rows.vocabulary.depth},
-                                 {"num_postings", num_postings},
-                                 {"num_plan_walls", rows.views.plan.walls.size()},
-                                 {"num_view_regions", rows.views.parents.size()},
-                                 {"num_view_links", rows.views.links.size()}};
+  nlohmann::ordered_json json = {
+      {"name", rows.name},
+      {"format", fmt::format("{}.{}", rows.descriptor_kind.is_sift() ? kMapVersionMajor : kMapVersionOfKinds,
+                             file.minor_version())},
+      {"descriptors", ToString(rows.descriptor_kind)},
+      {"writer", rows.writer},
+      {"instruction_set", rows.instruction_set},
+      {"sealed", rows.sealed},
+      {"seed", rows.seed},
+      {"unit", rows.frame.unit},
+      {"frame_source", rows.frame.source},
+      {"scale_sigma_ratio", rows.frame.scale_sigma_ratio},
+      {"bytes", num_bytes},
+      {"num_landmarks", rows.landmarks.size()},
+      {"landmarks", rows.landmark_choice},
+      {"num_regions", rows.regions.size()},
+      {"lower_bound", nullptr},
+      {"uncovered_limit", rows.uncovered_limit},
+      {"num_region_landmarks", num_region_landmarks},
+      {"algorithm", rows.algorithm},
+      {"k", rows.k},
+      {"tau", rows.tau},
+      {"rho", rows.rho},
+      {"num_stations", rows.stations.size()},
+      {"num_station_edges", num_edges},
+      {"num_uncovered_stations", num_uncovered},
+      {"num_images", rows.images.size()},
+      {"num_cameras", rows.cameras.size()},
+      {"stated_poses_moved_m", rows.stated_pose_sigma_m},
+      {"stated_poses_moved_deg", rows.stated_pose_sigma_deg},
+      {"covariance_scale", rows.covariance_scale},
+      {"keypoint_correlation", rows.keypoint_correlation},
+      {"num_appearance_nodes", rows.appearance.size()},
+      {"num_kept_nodes", num_kept},
+      {"documents", rows.documents},
+      {"num_words", rows.vocabulary.num_words()},
+      {"vocabulary_depth", rows.vocabulary.depth},
+      {"num_postings", num_postings},
+      {"num_plan_walls", rows.views.plan.walls.size()},
+      {"num_view_regions", rows.views.parents.size()},
+      {"num_view_links", rows.views.links.size()}};
   AddVisualMap(file.directory(), rows.visual_map, &json);
   if (rows.frame.scale_sigma_ratio > 0) {
     const Eigen::Vector3d& centre = rows.frame.scale_centre;

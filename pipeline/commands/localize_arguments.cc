@@ -84,6 +84,40 @@ Status CheckForRig(const LocalizeArguments& arguments) {
                    refused);
 }
 
+// Refuses what does not go with other features than SIFT's.
+Status CheckForFeatures(const LocalizeArguments& arguments, bool is_atlas) {
+  const bool are_given = !arguments.features_path.empty(), is_model = !arguments.model_path.empty();
+  if (!are_given && arguments.descriptors != LocalizeArguments().descriptors) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--descriptors says what those of --features are; give --features, or leave it out");
+  }
+  if (!are_given && !is_model) return Ok();
+  if (are_given && is_model) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--features gives the features that --model would find; leave one of them out");
+  }
+  const char* refused = is_atlas                ? "an atlas is asked with SIFT's features"
+                        : arguments.is_sequence ? "--sequence follows SIFT's features"
+                        : arguments.estimator != "pnp"
+                            ? "--estimator: a visual map is asked with SIFT's features"
+                        : !arguments.log_folder.empty() ? "--log keeps SIFT's features"
+                        : !arguments.rig_path.empty()   ? "--rig finds SIFT's features in each of its images"
+                                                        : nullptr;
+  if (refused != nullptr) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}, and {} has others, of single images; leave one of them out", refused,
+                     are_given ? "--features" : "--model");
+  }
+  SiftOptions of_sift;
+  std::vector<std::string> unread = NamesOf(DescribeOptions(&of_sift));
+  if (is_model) std::erase_if(unread, [](const std::string& name) { return name.starts_with("max_"); });
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+      unread, "is about finding SIFT's features, and these are others; leave it out"));
+  return arguments.option_arguments.RefuseGiven(
+      {"budget_ms", "core_speed"},
+      "bounds the work of finding SIFT's features, too, and these are others; leave it out");
+}
+
 // Refuses what an atlas of many maps has no use for, or a single map.
 Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
   if (!is_atlas) {
@@ -135,6 +169,7 @@ Status CheckLocalizeArguments(const LocalizeArguments& arguments, bool is_atlas)
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
   CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
   CAIRN_RETURN_IF_ERROR(CheckForRig(arguments));
+  CAIRN_RETURN_IF_ERROR(CheckForFeatures(arguments, is_atlas));
   return CheckForAtlas(arguments, is_atlas);
 }
 

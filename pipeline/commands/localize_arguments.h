@@ -29,6 +29,9 @@ struct LocalizeArguments {
   double period_s = 0;  // 0: not given
   GravityArguments gravity;
   std::string rig_path;
+  std::string features_path;  // empty: found in the images
+  std::string model_path;     // by this model; empty: SIFT
+  std::string descriptors = "auto";
   std::string estimator = "pnp";
   std::string log_folder;
   double log_mb_per_day = 0;  // 0: the default

@@ -19,6 +19,8 @@
 #include "core/capture/image_file.h"
 #include "core/colmap/image_list.h"
 #include "core/colmap/rig_config.h"
+#include "core/features/features.h"
+#include "core/learned/feature_finder.h"
 #include "pipeline/commands/in_atlas.h"
 #include "pipeline/commands/localization_json.h"
 #include "pipeline/commands/localize_arguments.h"
@@ -210,6 +212,39 @@ Answer LocalizeImage(const Asked& asked, const std::shared_ptr<const Map>& map, 
   return answer;
 }
 
+// By features that another program found.
+Answer LocalizeGiven(const Asked& asked, const GivenFeatures& given, const std::shared_ptr<const Map>& map,
+                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
+  Answer answer{.image = asked.image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(Features features, given.Find(asked.image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, given.CameraOf(asked.image, cameras, map->head()));
+    answer.camera_id = camera.camera_id;
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
+    answer.seconds = -ThreadSeconds();
+    return Localizer(map, arguments.options).LocalizeFeatures(std::move(features), camera, std::nullopt, up);
+  }();
+  answer.seconds += ThreadSeconds();
+  return answer;
+}
+
+// By features that a model finds.
+Answer LocalizeByModel(const Asked& asked, const FeatureFinder& finder, const std::shared_ptr<const Map>& map,
+                       const CameraChoice& cameras, const LocalizeArguments& arguments) {
+  Answer answer{.image = asked.image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
+    answer.seconds = -ThreadSeconds();
+    CAIRN_ASSIGN_OR_RETURN(Features features, finder.Find(grey));
+    return Localizer(map, arguments.options).LocalizeFeatures(std::move(features), camera, std::nullopt, up);
+  }();
+  answer.seconds += ThreadSeconds();
+  return answer;
+}
+
 // The same for the next frame of a sequence.
 Answer TrackImage(const Asked& asked, const std::shared_ptr<const Map>& map, const CameraChoice& cameras,
                   const LocalizeArguments& arguments, Trackers* trackers) {
@@ -324,6 +359,20 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   if (!arguments.rig_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rig, ReadRigConfig(arguments.rig_path));
   }
+  std::shared_ptr<const FeatureFinder> finder;
+  if (!arguments.model_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(finder, FeatureFinder::Make(arguments.options.sift, arguments.model_path));
+    CAIRN_RETURN_IF_ERROR(CheckSameKind(finder->kind(), map->head().descriptor_kind, arguments.model_path));
+  }
+  std::optional<GivenFeatures> given;
+  if (!arguments.features_path.empty()) {
+    const DescriptorKind& kind = map->head().descriptor_kind;
+    // Floating-point numbers do not say whether they are dense: the map does.
+    const bool is_dense = arguments.descriptors == "auto" && kind.type == DescriptorType::kDense;
+    CAIRN_ASSIGN_OR_RETURN(
+        given, GivenFeatures::Open(arguments.features_path, is_dense ? "dense" : arguments.descriptors));
+    CAIRN_RETURN_IF_ERROR(CheckSameKind(given->kind(), kind, arguments.features_path));
+  }
   const size_t batch_size =
       arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
@@ -337,6 +386,8 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
       answers[i] = visual         ? LocateByViews(asked[i], map, *visual, cameras, arguments, &trackers)
+                   : given        ? LocalizeGiven(asked[i], *given, map, cameras, arguments)
+                   : finder       ? LocalizeByModel(asked[i], *finder, map, cameras, arguments)
                    : !rig.empty() ? LocalizeRigImages(asked[i], rig, map, cameras, arguments)
                    : arguments.is_sequence ? TrackImage(asked[i], map, cameras, arguments, &trackers)
                                            : LocalizeImage(asked[i], map, cameras, arguments);
@@ -419,6 +470,23 @@ Command LocalizeCommand() {
                      "other cameras took at the same time have the same names behind other prefixes, and a "
                      "pose is the rig's, from all of them")
                 .Type("FILE");
+            parser
+                .Add("--features", arguments->features_path,
+                     "Features of the images that another program found, as of the map's survey: a COLMAP "
+                     "database, a "
+                     "kapture folder, a folder of IMAGE.npz, or a capture with features.db; images may be "
+                     "names alone")
+                .Type("SOURCE");
+            parser
+                .Add("--model", arguments->model_path,
+                     "Learned model that found the features of the map's survey ([extract_features] model): "
+                     "it finds "
+                     "those of the images, too")
+                .Type("FILE.onnx");
+            parser
+                .Add("--descriptors", arguments->descriptors,
+                     "With --features: what its descriptors are, as for `cairn features` [auto]")
+                .Type("KIND");
             parser
                 .Add("--period", arguments->period_s,
                      "With --min-place-probability: seconds from image to image [1]")

@@ -1,12 +1,11 @@
 #include "pipeline/commands/commands.h"
 
-#include <numbers>
-
 #include <nlohmann/json.hpp>
 
 #include "core/base/parallel.h"
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "core/geometry/pose.h"
 #include "core/plan/views.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/laser/interpretation_tree.h"
@@ -19,7 +18,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kMaxDrawnSolutions = 6;
 
 struct LocateScanArguments {
@@ -32,14 +30,14 @@ struct LocateScanArguments {
   OptionArguments option_arguments;
 };
 
-ordered_json Json(const Interpretation& found, FaceIdx region) {
+ordered_json InterpretationJson(const Interpretation& found, FaceIdx region) {
   ordered_json covariance = ordered_json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) covariance.push_back(found.covariance(row, column));
   }
   return {{"x", found.pose.position.x()},
           {"y", found.pose.position.y()},
-          {"heading_deg", found.pose.heading_rad / kDegree},
+          {"heading_deg", DegFromRad(found.pose.heading_rad)},
           {"determined", found.determined},
           {"matched", found.num_matched},
           {"matched_length_m", found.matched_length_m},
@@ -105,7 +103,7 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
     } else {
       ordered_json solutions = ordered_json::array();
       for (const Interpretation& found : result->solutions)
-        solutions.push_back(Json(found, locator.Find(found.pose.position)));
+        solutions.push_back(InterpretationJson(found, locator.Find(found.pose.position)));
       num_located += !result->solutions.empty();
       line["nodes"] = result->num_nodes;
       line["expanded"] = result->num_expanded;

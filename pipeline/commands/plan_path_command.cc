@@ -1,11 +1,11 @@
 #include "pipeline/commands/commands.h"
 
 #include <cmath>
-#include <numbers>
 
 #include <nlohmann/json.hpp>
 
 #include "core/files/file.h"
+#include "core/geometry/pose.h"
 #include "core/plan/views.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/map/open_views.h"
@@ -18,8 +18,6 @@ namespace {
 
 using nlohmann::ordered_json;
 using Vec2 = Eigen::Vector2d;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 ordered_json PathJson(const std::vector<Vec2>& points) {
   ordered_json list = ordered_json::array();
@@ -99,7 +97,7 @@ Result<PlanarPose> ParsePose(const std::string& option, const std::vector<double
                      "{} {:g},{:g},{:g}: the heading must be in [-360, 360] degrees", option, values[0],
                      values[1], values[2]);
   }
-  return PlanarPose{{values[0], values[1]}, values[2] * kDegree};
+  return PlanarPose{{values[0], values[1]}, RadFromDeg(values[2])};
 }
 
 const char* OutcomeName(DisambiguationOutcome outcome) {

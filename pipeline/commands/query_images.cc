@@ -50,6 +50,32 @@ Result<std::optional<Camera>> CameraChoice::GivenForImage(int width, int height)
   return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
 }
 
+Result<GivenFeatures> GivenFeatures::Open(const std::string& path, const std::string& descriptors) {
+  CAIRN_ASSIGN_OR_RETURN(FeatureFiles files, FeatureFiles::Open(path, descriptors));
+  return GivenFeatures(std::move(files));
+}
+
+Result<Features> GivenFeatures::Find(const std::string& image) const {
+  for (std::string name = image;; name = name.substr(name.find('/') + 1)) {
+    CAIRN_ASSIGN_OR_RETURN(std::optional<Features> features, files_.Find(name));
+    if (features) return std::move(*features);
+    if (name.find('/') == std::string::npos) break;
+  }
+  return MakeError(ErrorCode::kNotFound, "the {} of --features has no features of it", files_.layout());
+}
+
+Result<Camera> GivenFeatures::CameraOf(const std::string& image, const CameraChoice& cameras,
+                                       const MapHead& head) const {
+  if (cameras.is_one()) return cameras.ForImage(0, 0);
+  if (!cameras.is_given() && head.cameras.size() == 1) return head.cameras.front();
+  const Result<cv::Mat> grey = ReadGreyImage(image);
+  if (grey.ok()) return cameras.ForImage(grey->cols, grey->rows);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "which camera took it? There is no image file to say its size ({}); give "
+                   "--camera",
+                   grey.error().message);
+}
+
 Result<std::vector<RigImage>> ReadRigImages(const std::string& image, const std::vector<RigCamera>& rig,
                                             const CameraChoice& cameras) {
   std::vector<RigImage> images;

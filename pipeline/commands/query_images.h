@@ -10,6 +10,7 @@
 #include "core/base/ids.h"
 #include "core/camera/camera.h"
 #include "core/colmap/rig_config.h"
+#include "core/feature_files/feature_files.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
 
@@ -29,6 +30,10 @@ class CameraChoice {
 
   // REQUIRES: a map.  Errors: InvalidArgument, NotFound: several cameras or none take such images.
   Result<Camera> ForImage(int width, int height) const;
+  // Whether all images have the one of --camera.
+  bool is_one() const { return camera_.has_value(); }
+  // Whether any was given on the command line.
+  bool is_given() const { return is_one() || !cameras_.empty(); }
   // The same without the map's: nothing where none was given on the command line.
   Result<std::optional<Camera>> GivenForImage(int width, int height) const;
 
@@ -36,6 +41,25 @@ class CameraChoice {
   std::shared_ptr<const Map> map_;
   std::optional<Camera> camera_;
   std::map<CameraId, Camera> cameras_;
+};
+
+// Features of images that another program found, `cairn localize --features`.
+class GivenFeatures {
+ public:
+  // Errors: those of FeatureFiles::Open.
+  static Result<GivenFeatures> Open(const std::string& path, const std::string& descriptors);
+
+  const DescriptorKind& kind() const { return files_.kind(); }
+  // Those of an image, by its name or by the end of its path.  Errors: NotFound, and those of FeatureFiles.
+  Result<Features> Find(const std::string& image) const;
+  // Its camera: given for all, or the map's only one, or that of its size, which its file says.  Errors:
+  // InvalidArgument.
+  Result<Camera> CameraOf(const std::string& image, const CameraChoice& cameras, const MapHead& head) const;
+
+ private:
+  explicit GivenFeatures(FeatureFiles files) : files_(std::move(files)) {}
+
+  FeatureFiles files_;
 };
 
 // The images that the cameras of a rig took at the same time as the reference camera took this one, each with

@@ -58,19 +58,23 @@ std::vector<Eigen::Vector3d> StationPlaces(const MapRows& rows) {
 }
 
 // Between two descriptors, whatever their lengths: rounding to few levels changes those.
-double AngleRad(const uint8_t* a, const uint8_t* b) {
-  const double lengths = std::sqrt(static_cast<double>(DescriptorDot(a, a)) * DescriptorDot(b, b));
-  return lengths > 0 ? std::acos(std::clamp(DescriptorDot(a, b) / lengths, 0.0, 1.0)) : 0;
+double AngleRad(const uint8_t* a, const uint8_t* b, const DescriptorSpace& space) {
+  const double lengths =
+      std::sqrt(static_cast<double>(DescriptorDot(a, a, space)) * DescriptorDot(b, b, space));
+  return lengths > 0 ? std::acos(std::clamp(DescriptorDot(a, b, space) / lengths, 0.0, 1.0)) : 0;
 }
 
 std::vector<int32_t> MatchLandmarks(const MapRows& a, const MapRows& b, const CompareMapsOptions& options) {
   const double max_angle = RadFromDeg(options.max_descriptor_angle_deg);
-  return MutuallyBest(
-      LandmarkPlaces(a), LandmarkPlaces(b), options.max_landmark_distance_m, [&](size_t i, int j, double) {
-        const double angle =
-            AngleRad(a.descriptors.row(static_cast<Eigen::Index>(i)).data(), b.descriptors.row(j).data());
-        return angle <= max_angle ? angle : -1.0;
-      });
+  // Landmarks with descriptors of another kind are others.
+  if (a.descriptor_kind.space() != b.descriptor_kind.space())
+    return std::vector<int32_t>(a.landmarks.size(), -1);
+  return MutuallyBest(LandmarkPlaces(a), LandmarkPlaces(b), options.max_landmark_distance_m,
+                      [&](size_t i, int j, double) {
+                        const double angle = AngleRad(a.descriptors.row(static_cast<Eigen::Index>(i)).data(),
+                                                      b.descriptors.row(j).data(), a.descriptor_kind.space());
+                        return angle <= max_angle ? angle : -1.0;
+                      });
 }
 
 std::vector<int32_t> MatchStations(const MapRows& a, const MapRows& b, const CompareMapsOptions& options) {

@@ -80,7 +80,8 @@ std::vector<MapScore> CodeIndex::Rank(const Features& features) const {
   };
   std::map<int32_t, Shown> shown;  // by entry
   for (const size_t feature : LargestFeatures(features)) {
-    const DescriptorCode code = CodeOf(code_book_, features.descriptors.data() + feature * kDescriptorDim);
+    const DescriptorCode code =
+        CodeOf(code_book_, features.descriptors.data() + feature * kSiftDescriptorDim);
     const std::vector<int32_t> hits = Find(code);
     std::set<int32_t> maps;
     for (const int32_t hit : hits) maps.insert(map_of_place_[entries_[hit].place]);

@@ -1,11 +1,13 @@
 // The C API (runtime/c_api/cairn.h) over the C++ one: versions and names, maps, localizers.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "core/features/features.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
 #include "runtime/c_api/logs.h"
@@ -185,6 +187,60 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
     CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(*query, believed));
     Return(FixFrom(found), fix);
     if (used->log) used->log->Offer(&frame, found);
+    return Ok();
+  });
+}
+
+int32_t cairn_localize_features(cairn_localizer* localizer, const float* keypoints, const void* descriptors,
+                                int32_t is_float, int32_t num_columns, int32_t num_features,
+                                const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix) {
+  return Call("cairn_localize_features", [&]() -> Status {
+    CAIRN_RETURN_IF_ERROR(CheckFix(fix));
+    Return(FixFrom({}), fix);
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    const auto up = std::exchange(used->up, std::nullopt);
+    if (num_features < 0 || num_columns < 0)
+      return Misuse("{} features of {} values each", num_features, num_columns);
+    if (num_features > 0 && (keypoints == nullptr || descriptors == nullptr))
+      return Misuse("{} is NULL", keypoints == nullptr ? "keypoints" : "descriptors");
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<Camera> chosen, GivenCameraOf(camera));
+    if (!chosen) return Misuse("camera is NULL: features do not say how large their image is");
+    CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
+    const DescriptorKind& kind = used->map->head().descriptor_kind;
+    Features features{.keypoints = {}, .descriptors = DescriptorMatrix(0, kind.num_values), .kind = kind};
+    for (int32_t i = 0; i < num_features; ++i) {
+      const float* k = keypoints + 4 * static_cast<ptrdiff_t>(i);
+      if (!std::all_of(k, k + 4, [](float value) { return std::isfinite(value); }))
+        return Misuse("keypoint {} is not finite", i);
+      features.keypoints.push_back({k[0], k[1], k[2], k[3]});
+    }
+    if (num_features > 0 && is_float != 0) {
+      CAIRN_ASSIGN_OR_RETURN(
+          features.descriptors,
+          DescriptorsFromFloats(Eigen::Map<const FloatDescriptors>(static_cast<const float*>(descriptors),
+                                                                   num_features, num_columns),
+                                kind));
+    } else if (num_features > 0) {
+      CAIRN_ASSIGN_OR_RETURN(
+          features.descriptors,
+          DescriptorsFromBytes(static_cast<const uint8_t*>(descriptors), num_features, num_columns, kind));
+    }
+    CAIRN_ASSIGN_OR_RETURN(const Localization found,
+                           used->localizer->LocalizeFeatures(std::move(features), *chosen, believed, up));
+    Return(FixFrom(found), fix);
+    return Ok();
+  });
+}
+
+int32_t cairn_map_descriptors(const cairn_map* map, char* text, int32_t capacity) {
+  return Call("cairn_map_descriptors", [&]() -> Status {
+    if (text == nullptr || capacity < 1) return Misuse("there is no place for the text");
+    text[0] = '\0';
+    CAIRN_ASSIGN_OR_RETURN(const auto open, FindMap(map));
+    const std::string kind = ToString(open->head().descriptor_kind);
+    const size_t num = std::min(kind.size(), static_cast<size_t>(capacity) - 1);
+    kind.copy(text, num);
+    text[num] = '\0';
     return Ok();
   });
 }

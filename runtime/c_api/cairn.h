@@ -362,6 +362,17 @@ CAIRN_API int32_t cairn_localizer_destroy(cairn_localizer* localizer);
  * error: see fix->has_fix.  After an error *fix has no fix. */
 CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image,
                                  const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix);
+/* From features that the caller found, as those of the map's survey (cairn_map_descriptors).  `keypoints`: x,
+ * y, scale and orientation of each, 4 * num_features numbers; the first pixel's centre is (0.5, 0.5); a scale
+ * of 0: not measured. `descriptors`: num_features rows of `num_columns`, floats (is_float 1) of a float or
+ * dense kind, of any length; bytes (is_float 0) of SIFT, 128, or of a binary kind, whose bits they are.
+ * CAIRN_INVALID_ARGUMENT: others.  They are not logged. */
+CAIRN_API int32_t cairn_localize_features(cairn_localizer* localizer, const float* keypoints,
+                                          const void* descriptors, int32_t is_float, int32_t num_columns,
+                                          int32_t num_features, const cairn_camera* camera,
+                                          const cairn_prior* prior, cairn_fix* fix);
+/* What the landmarks' descriptors are, with a NUL, cut to `capacity` bytes: "sift", "binary 256 orb". */
+CAIRN_API int32_t cairn_map_descriptors(const cairn_map* map, char* text, int32_t capacity);
 /* Which way is up at the next image, or the next of a rig: a direction in the camera's frame (a rig's), of
  * any length, and its standard deviation per axis.  An accelerometer says so while the robot does not speed
  * up or brake, an IMU always.  No pose tilts the camera then

@@ -176,7 +176,7 @@ int32_t cairn_place_model_look_at_features(cairn_place_model* model, const uint8
                     if (num_features < 0)
                       return Misuse("num_features is {}; must not be negative", num_features);
                     if (descriptors == nullptr && num_features > 0) return Misuse("descriptors is NULL");
-                    DescriptorMatrix rows(num_features, kDescriptorDim);
+                    DescriptorMatrix rows(num_features, kSiftDescriptorDim);
                     std::copy_n(descriptors, rows.size(), rows.data());
                     return used->model->Look(rows);
                   });

@@ -36,7 +36,11 @@ Status CheckImageServo(const ImageServoOptions& options) {
   return CheckOptions(DescribeOptions(&checked));
 }
 
-Status CheckDescribed(size_t num_pixels, const DescriptorMatrix& descriptors) {
+Status CheckDescribed(size_t num_pixels, const DescriptorMatrix& descriptors, const DescriptorKind& kind) {
+  if (descriptors.rows() > 0 && descriptors.cols() != kind.num_values) {
+    return MakeError(ErrorCode::kInvalidArgument, "descriptors of {} values, expected {} of the kind '{}'",
+                     descriptors.cols(), kind.num_values, ToString(kind));
+  }
   if (static_cast<Eigen::Index>(num_pixels) == descriptors.rows()) return Ok();
   return MakeError(ErrorCode::kInvalidArgument, "{} pixels with {} descriptors", num_pixels,
                    descriptors.rows());
@@ -61,20 +65,23 @@ Result<ServoTarget> TargetOfImage(const Map& map, int32_t image_idx, const std::
     target.pixels.push_back(*pixel);
     rows.push_back(static_cast<Eigen::Index>(i));
   }
-  target.descriptors.resize(static_cast<Eigen::Index>(rows.size()), kDescriptorDim);
+  target.kind = map.head().descriptor_kind;
+  target.descriptors.resize(static_cast<Eigen::Index>(rows.size()), landmarks->descriptors.cols());
   for (size_t i = 0; i < rows.size(); ++i) target.descriptors.row(i) = landmarks->descriptors.row(rows[i]);
   return target;
 }
 
 ServoTarget TargetOfFeatures(const Features& features) {
-  ServoTarget target{{}, features.descriptors};
+  ServoTarget target{{}, features.descriptors, features.kind};
   for (const Keypoint& keypoint : features.keypoints) target.pixels.emplace_back(keypoint.x, keypoint.y);
   return target;
 }
 
 std::vector<PixelPair> MatchPixels(const Features& seen, const ServoTarget& target) {
   std::vector<PixelPair> pairs;
-  for (const Match& match : MatchDescriptors(seen.descriptors, target.descriptors, kPixelMatcher)) {
+  if (seen.kind.space() != target.kind.space()) return pairs;
+  for (const Match& match :
+       MatchDescriptors(seen.descriptors, target.descriptors, target.kind.space(), kPixelMatcher)) {
     const Keypoint& keypoint = seen.keypoints[match.idx1];
     pairs.push_back({{keypoint.x, keypoint.y}, target.pixels[match.idx2]});
   }
@@ -137,7 +144,7 @@ Result<ImageServo> ImageServo::ToImage(std::shared_ptr<const Map> map, int32_t i
 Result<ImageServo> ImageServo::ToTarget(ServoTarget target, const Camera& camera,
                                         const ImageServoOptions& options) {
   CAIRN_RETURN_IF_ERROR(CheckImageServo(options));
-  CAIRN_RETURN_IF_ERROR(CheckDescribed(target.pixels.size(), target.descriptors));
+  CAIRN_RETURN_IF_ERROR(CheckDescribed(target.pixels.size(), target.descriptors, target.kind));
   ImageServo servo(options);
   servo.target_ = std::move(target);
   CAIRN_RETURN_IF_ERROR(servo.BeginWith(camera));
@@ -164,7 +171,7 @@ Result<ServoCommand> ImageServo::Step(const cv::Mat& grey, const Camera& camera)
 }
 
 Result<ServoCommand> ImageServo::StepFeatures(const Features& seen, const Camera& camera) {
-  CAIRN_RETURN_IF_ERROR(CheckDescribed(seen.keypoints.size(), seen.descriptors));
+  CAIRN_RETURN_IF_ERROR(CheckDescribed(seen.keypoints.size(), seen.descriptors, seen.kind));
   if (!servo_) {
     CAIRN_RETURN_IF_ERROR(BeginWith(camera));
   } else if (!IsSameCamera(camera, camera_)) {
@@ -174,6 +181,7 @@ Result<ServoCommand> ImageServo::StepFeatures(const Features& seen, const Camera
                      CameraModelName(camera.model), camera.width, camera.height,
                      CameraModelName(camera_.model), camera_.width, camera_.height);
   }
+  CAIRN_RETURN_IF_ERROR(CheckSameKind(seen.kind, target_.kind, "the image"));
   return servo_->Step(MatchPixels(seen, target_));
 }
 

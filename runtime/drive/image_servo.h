@@ -23,6 +23,7 @@ class Map;  // runtime/map/map.h
 struct ServoTarget {
   std::vector<Eigen::Vector2d> pixels;  // COLMAP's convention
   DescriptorMatrix descriptors;         // row i: pixel i
+  DescriptorKind kind;
 };
 
 // Of a survey image: the landmarks that it sees, where a camera at its pose has them; without a camera, the

@@ -6,6 +6,7 @@
 #include "core/base/no_throw.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/features/features.h"
 #include "core/vocabulary/document_scores.h"
 #include "runtime/drive/route.h"
 #include "runtime/localize/measurement.h"
@@ -44,6 +45,11 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
     auto model = std::make_shared<Impl>();
     model->options = options;
+    if (const DescriptorKind& kind = map.head().descriptor_kind; !kind.is_sift()) {
+      return MakeError(ErrorCode::kUnsupported,
+                       "map '{}' has descriptors of the kind '{}', and places are told apart by SIFT's",
+                       map.head().name, ToString(kind));
+    }
     CAIRN_ASSIGN_OR_RETURN(model->appearance, map.Appearance());
     if (model->appearance->is_kept.empty() || !map.has_words()) {
       return MakeError(

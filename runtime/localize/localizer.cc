@@ -10,6 +10,7 @@
 #include "core/base/no_throw.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/features/features.h"
 #include "core/work/affordable_sift.h"
 #include "core/work/work_budget.h"
 #include "runtime/localize/accept.h"
@@ -174,13 +175,20 @@ Result<Query> Localizer::CoarseQueryFromImage(const cv::Mat& grey, const Camera&
 Result<Query> Localizer::QueryWithin(const cv::Mat& grey, const Camera& camera, bool coarse,
                                      Budget work) const {
   CAIRN_RETURN_IF_ERROR(CheckImage(grey, camera));
+  if (const DescriptorKind& kind = map_->head().descriptor_kind; !kind.is_sift()) {
+    return MakeError(
+        ErrorCode::kUnsupported,
+        "the map's landmarks have descriptors of the kind '{}', and SIFT's alone are found in images here; "
+        "give features of that kind (LocalizeFeatures, `cairn localize --features`)",
+        ToString(kind));
+  }
   if (!work) work = MakeBudget();
   const int64_t of_feature_ps =
       WorkBudget::PicosecondsOf(Work::kRay) + WorkBudget::PicosecondsOf(Work::kWord);
   CAIRN_ASSIGN_OR_RETURN(std::optional<AffordedSift> found,
                          AffordableSift(grey, options_.sift, coarse, of_feature_ps, work.get()));
   const bool had_no_room = !found;
-  if (had_no_room) found.emplace().features.descriptors.resize(0, kDescriptorDim);
+  if (had_no_room) found.emplace();
   CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(found->features), camera, work));
   query.min_scale_px = found->min_scale_px;
   query.had_no_room = had_no_room;
@@ -207,10 +215,15 @@ Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& came
     return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
                      features.keypoints.size(), features.descriptors.rows());
   }
+  CAIRN_RETURN_IF_ERROR(CheckSameKind(features.kind, map_->head().descriptor_kind, "the image"));
+  if (features.descriptors.cols() != features.kind.num_values && features.descriptors.rows() > 0) {
+    return MakeError(ErrorCode::kInvalidArgument, "localize: descriptors of {} values, expected {}",
+                     features.descriptors.cols(), features.kind.num_values);
+  }
   if (!work) work = MakeBudget();
   if (!Spend(work.get(), Work::kRay, features.keypoints.size())) {
     features.keypoints.clear();
-    features.descriptors.resize(0, kDescriptorDim);
+    features.descriptors.resize(0, features.kind.num_values);
   }
   Query query = MakeQuery(std::move(features), AsFound(map_->head(), camera), options_.measurement);
   query.work = std::move(work);

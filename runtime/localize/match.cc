@@ -71,7 +71,7 @@ class KeypointGrid {
 
 bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
                double max_ratio) {
-  if (landmark.scale_m <= 0) return true;  // not known
+  if (landmark.scale_m <= 0 || keypoint.scale <= 0) return true;  // not known
   const double ratio = keypoint.scale * depth_m / (landmark.scale_m * focal_px);
   return ratio <= max_ratio && ratio * max_ratio >= 1;
 }
@@ -127,8 +127,8 @@ class GuidedSearch {
   // Each as far beside its projection as so many times its radius, where that is in the image.
   std::vector<Correspondence> Match(const Eigen::Vector2d& moved_in_radii) const {
     const double focal_px = query_.camera.MeanFocal();
-    // An angle between RootSIFT vectors of norm 512 as a dot product.
-    const double min_dot = kSquaredDescriptorNorm * std::cos(options_.guided_max_angle_rad);
+    const DescriptorSpace& space = query_.packed.space();
+    const double min_dot = DotAtAngle(options_.guided_max_angle_rad, space);
     struct Best {
       int32_t dot = -1;
       LandmarkIdx landmark = 0;
@@ -146,7 +146,7 @@ class GuidedSearch {
         if (!ScaleFits(query_.features.keypoints[i], landmarks_.landmarks[at.k], at.depth, focal_px,
                        options_.guided_max_scale_ratio))
           return;
-        const int32_t dot = DescriptorDot(query_.features.descriptors.row(i).data(), descriptor);
+        const int32_t dot = DescriptorDot(query_.features.descriptors.row(i).data(), descriptor, space);
         if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
       });
       if (!Spend(query_.work.get(), Work::kNear, num_near)) break;

@@ -104,7 +104,7 @@ Query MakeQuery(Features features, const Camera& camera, const MeasurementOption
   Query query;
   query.camera = camera;
   query.rays = RaysOf(features.keypoints, camera, options);
-  query.packed = PackedDescriptors(features.descriptors);
+  query.packed = PackedDescriptors(features.descriptors, features.kind.space());
   query.features = std::move(features);
   return query;
 }

@@ -118,11 +118,13 @@ Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& 
   CAIRN_ASSIGN_OR_RETURN(const auto all, map.AllLandmarks());
   std::vector<BestTwo> nearest, unused;
   FindBestTwo(query.packed, all->packed, &nearest, &unused);
-  const double min_dot = kSquaredDescriptorNorm * std::cos(options.max_word_angle_rad);
+  const DescriptorSpace& space = query.packed.space();
+  const double min_dot = DotAtAngle(options.max_word_angle_rad, space);
   std::vector<int> counts(all->idx.size(), 0);
   for (const BestTwo& word : nearest) {
     if (word.idx < 0 || word.best < min_dot) continue;
-    if (DescriptorAngleRad(word.best) <= options.max_word_ratio * DescriptorAngleRad(word.second))
+    if (DescriptorAngleRad(word.best, space) <=
+        options.max_word_ratio * DescriptorAngleRad(word.second, space))
       ++counts[word.idx];
   }
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));

@@ -67,6 +67,7 @@ struct Map::Store {
         rows(std::make_unique<const MapRows>(std::move(given))),
         layout(std::make_unique<const MapLayout>(*rows)),
         cache(std::numeric_limits<int64_t>::max()) {
+    directory.set_descriptor_kind(head.descriptor_kind);
     for (const BlockEntry& entry : layout->entries()) directory.Add(entry);
   }
 
@@ -275,7 +276,8 @@ Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> 
   auto set = std::make_shared<LandmarkSet>();
   set->idx = std::move(landmarks);
   set->landmarks.reserve(set->idx.size());
-  set->descriptors.resize(static_cast<Eigen::Index>(set->idx.size()), kDescriptorDim);
+  const DescriptorKind& kind = directory().descriptor_kind();
+  set->descriptors.resize(static_cast<Eigen::Index>(set->idx.size()), kind.num_values);
   std::shared_ptr<const LandmarkBlock> block;
   for (size_t i = 0; i < set->idx.size(); ++i) {
     const LandmarkIdx landmark = set->idx[i];
@@ -285,7 +287,7 @@ Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> 
     set->landmarks.push_back(block->landmarks[landmark - block->first]);
     set->descriptors.row(static_cast<Eigen::Index>(i)) = block->descriptors.row(landmark - block->first);
   }
-  if (packed) set->packed = PackedDescriptors(set->descriptors);
+  if (packed) set->packed = PackedDescriptors(set->descriptors, kind.space());
   return std::shared_ptr<const LandmarkSet>(std::move(set));
 }
 

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include "core/features/features.h"
 #include "core/options/find_option.h"
 
 namespace py = pybind11;
@@ -75,6 +76,65 @@ cv::Mat PixelsOf(const py::array& image) {
   const auto stride = static_cast<size_t>(image.shape(0) > 1 ? image.strides(0) : image.shape(1));
   return cv::Mat(static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1)), CV_8UC1,
                  const_cast<void*>(image.data()), stride);
+}
+
+namespace {
+
+// The numbers of an array of rows, as they are or converted between floating-point types.
+template <typename T>
+py::array_t<T> RowsOf(const py::array& array, const char* what) {
+  if (array.ndim() != 2)
+    throw py::value_error(fmt::format("{} have {} dimensions, expected (n, m)", what, array.ndim()));
+  return py::array_t<T, py::array::c_style | py::array::forcecast>(array);
+}
+
+bool AreFloats(const py::array& array) { return array.dtype().kind() == 'f'; }
+
+std::string DtypeOf(const py::array& array) { return py::cast<std::string>(py::str(array.dtype())); }
+
+}  // namespace
+
+std::vector<Keypoint> KeypointsOf(const py::array& keypoints) {
+  if (!AreFloats(keypoints))
+    throw py::type_error(
+        fmt::format("keypoints have dtype {}, expected floating-point numbers", DtypeOf(keypoints)));
+  const py::array_t<float> rows = RowsOf<float>(keypoints, "keypoints");
+  const auto values = rows.unchecked<2>();
+  const py::ssize_t columns = values.shape(1);
+  if (columns < 2 || columns > 4) {
+    throw py::value_error(
+        fmt::format("keypoints have {} columns, expected 2 to 4: x, y, scale, orientation", columns));
+  }
+  std::vector<Keypoint> found(static_cast<size_t>(values.shape(0)));
+  for (py::ssize_t i = 0; i < values.shape(0); ++i) {
+    found[i] = {values(i, 0), values(i, 1), columns > 2 ? values(i, 2) : 0, columns > 3 ? values(i, 3) : 0};
+    for (py::ssize_t k = 0; k < columns; ++k) {
+      if (!std::isfinite(values(i, k))) throw py::value_error(fmt::format("keypoint {} is not finite", i));
+    }
+  }
+  return found;
+}
+
+DescriptorMatrix DescriptorsOf(const py::array& descriptors, const DescriptorKind& kind) {
+  Result<DescriptorMatrix> found = MakeError(ErrorCode::kInvalidArgument, "");
+  if (AreFloats(descriptors)) {
+    if (kind.is_sift() || kind.type == DescriptorType::kBinary) {
+      throw py::type_error(
+          fmt::format("descriptors have dtype {}, expected uint8: the map's are of the kind '{}'",
+                      DtypeOf(descriptors), ToString(kind)));
+    }
+    const py::array_t<float> rows = RowsOf<float>(descriptors, "descriptors");
+    found = DescriptorsFromFloats(
+        Eigen::Map<const FloatDescriptors>(rows.data(), rows.shape(0), rows.shape(1)), kind);
+  } else if (py::isinstance<py::array_t<uint8_t>>(descriptors)) {
+    const py::array_t<uint8_t> rows = RowsOf<uint8_t>(descriptors, "descriptors");
+    found = DescriptorsFromBytes(rows.data(), rows.shape(0), rows.shape(1), kind);
+  } else {
+    throw py::type_error(fmt::format("descriptors have dtype {}, expected floating-point numbers or uint8",
+                                     DtypeOf(descriptors)));
+  }
+  if (!found.ok()) throw py::value_error(found.error().message);
+  return std::move(*found);
 }
 
 void SetFromPython(const OptionTable& table, const py::kwargs& given, const char* help) {

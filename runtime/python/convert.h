@@ -48,6 +48,13 @@ std::optional<PublicKey> KeyOf(const std::optional<pybind11::bytes>& given);
 // another dtype and a ValueError for another shape or order, which say what was found.
 cv::Mat PixelsOf(const pybind11::array& image);
 
+// Of an array of floating-point numbers, n x 2, 3 or 4.  Throws a TypeError or a ValueError that says what
+// was found.
+std::vector<Keypoint> KeypointsOf(const pybind11::array& keypoints);
+// Of an array of the map's kind: floating-point values, or bytes of SIFT or of bits.  Throws a TypeError for
+// another dtype, a ValueError for another shape or a value that is not finite.
+DescriptorMatrix DescriptorsOf(const pybind11::array& descriptors, const DescriptorKind& kind);
+
 // Sets options from keyword arguments; `help` says where they are listed.  Throws cairn.Error for an unknown
 // name or a value out of range.
 void SetFromPython(const OptionTable& table, const pybind11::kwargs& given,

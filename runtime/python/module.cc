@@ -8,6 +8,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "core/features/features.h"
 #include "runtime/drive/route.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -67,6 +68,18 @@ class PyLocalizer {
     Localization found = ValueOrThrow(localizer_->LocalizeQuery(*query, prior));
     log_->Offer(&frame, found);
     return found;
+  }
+
+  // Features that another program found, of the map's kind.
+  Localization LocalizeFeatures(const py::array& keypoints, const py::array& descriptors,
+                                const Camera& camera, const std::optional<PosePrior>& prior,
+                                const std::optional<SensedUp>& up) {
+    Features features{
+        .keypoints = KeypointsOf(keypoints), .descriptors = {}, .kind = map_->head().descriptor_kind};
+    features.descriptors = DescriptorsOf(descriptors, features.kind);
+    const py::gil_scoped_release release;
+    const auto used = one_thread_.Use();
+    return ValueOrThrow(localizer_->LocalizeFeatures(std::move(features), camera, prior, up));
   }
 
   Localization LocalizeRig(const std::vector<PyRigImage>& images, const std::optional<PosePrior>& prior,
@@ -175,6 +188,8 @@ void BindMap(py::module_& module) {
           },
           py::arg("start"), py::arg("goal"), py::arg("weight") = RouteOptions().weight)
       .def_property_readonly("name", [](const PyMap& self) { return self.map->head().name; })
+      .def_property_readonly("descriptors",
+                             [](const PyMap& self) { return ToString(self.map->head().descriptor_kind); })
       .def_property_readonly("epoch", [](const PyMap& self) { return self.map->head().epoch; })
       .def_property_readonly("num_landmarks", [](const PyMap& self) { return self.map->num_landmarks(); })
       .def_property_readonly("num_images", [](const PyMap& self) { return self.map->num_images(); })
@@ -292,6 +307,9 @@ void BindLocalizer(py::module_& module) {
            py::arg("log") = py::none())
       .def("localize", &PyLocalizer::Localize, py::arg("image").noconvert(), py::arg("camera") = py::none(),
            py::arg("prior") = py::none(), py::arg("up") = py::none())
+      .def("localize_features", &PyLocalizer::LocalizeFeatures, py::arg("keypoints").noconvert(),
+           py::arg("descriptors").noconvert(), py::arg("camera"), py::arg("prior") = py::none(),
+           py::arg("up") = py::none())
       .def("localize_rig", &PyLocalizer::LocalizeRig, py::arg("images"), py::arg("prior") = py::none(),
            py::arg("up") = py::none());
 }

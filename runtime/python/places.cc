@@ -69,14 +69,14 @@ class PyPlaceModel {
     if (!py::isinstance<py::array_t<uint8_t>>(descriptors))
       throw py::type_error(fmt::format("descriptors have dtype {}, expected uint8",
                                        py::cast<std::string>(py::str(descriptors.dtype()))));
-    if (descriptors.ndim() != 2 || descriptors.shape(1) != kDescriptorDim)
+    if (descriptors.ndim() != 2 || descriptors.shape(1) != kSiftDescriptorDim)
       throw py::value_error(fmt::format("descriptors have shape {}, expected (n, {})",
                                         py::cast<std::string>(py::str(descriptors.attr("shape"))),
-                                        kDescriptorDim));
+                                        kSiftDescriptorDim));
     const auto values = py::array_t<uint8_t>(descriptors).unchecked<2>();
-    DescriptorMatrix rows(values.shape(0), kDescriptorDim);
+    DescriptorMatrix rows(values.shape(0), kSiftDescriptorDim);
     for (Eigen::Index i = 0; i < rows.rows(); ++i)
-      for (Eigen::Index k = 0; k < kDescriptorDim; ++k) rows(i, k) = values(i, k);
+      for (Eigen::Index k = 0; k < kSiftDescriptorDim; ++k) rows(i, k) = values(i, k);
     const py::gil_scoped_release release;
     return model_->Look(rows);
   }

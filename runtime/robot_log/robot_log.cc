@@ -149,6 +149,11 @@ Result<RobotLog> RobotLog::Open(const std::string& folder, const MapHead& map, c
     return MakeError(ErrorCode::kInvalidArgument, "max_mb_per_day is {:g}; must be greater than 0",
                      options.max_mb_per_day);
   }
+  if (!map.descriptor_kind.is_sift()) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "map '{}' has descriptors of the kind '{}', and a log keeps SIFT's", map.name,
+                     ToString(map.descriptor_kind));
+  }
   const std::string path = folder + "/" + kFeaturesFile;
   CAIRN_RETURN_IF_ERROR(CheckIsOurs(folder, path));
   CAIRN_ASSIGN_OR_RETURN(FileLock lock, LockFolder(folder));
@@ -225,7 +230,7 @@ Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineCloc
   if (frame.features->keypoints.empty() || !IsElsewhere(frame.cam_from_world)) return false;
   std::error_code error;
   double num_bytes = kBytesBesides + static_cast<double>(frame.features->keypoints.size() *
-                                                         (sizeof(Keypoint) + kDescriptorDim));
+                                                         (sizeof(Keypoint) + kSiftDescriptorDim));
   if (options_.keep_images) {
     const uintmax_t of_image = fs::file_size(frame.image_path, error);
     if (error) return MakeError(ErrorCode::kIo, "{}: {}", frame.image_path, error.message());

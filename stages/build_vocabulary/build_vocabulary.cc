@@ -6,6 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/features/features.h"
 
 namespace cairn::build_vocabulary {
 namespace {
@@ -25,11 +26,12 @@ std::vector<int64_t> Draw(int64_t total, int64_t count, uint64_t seed) {
   return numbers;
 }
 
-DescriptorMatrix TrainingDescriptors(const std::vector<ImageDescriptors>& images, int64_t num_descriptors,
-                                     int max_num_training_descriptors, uint64_t seed) {
+DescriptorMatrix TrainingDescriptors(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
+                                     int64_t num_descriptors, int max_num_training_descriptors,
+                                     uint64_t seed) {
   const std::vector<int64_t> drawn =
       Draw(num_descriptors, max_num_training_descriptors, MixSeed(seed, kSampleStream));
-  DescriptorMatrix training(static_cast<Eigen::Index>(drawn.size()), kDescriptorDim);
+  DescriptorMatrix training(static_cast<Eigen::Index>(drawn.size()), kind.num_values);
   size_t image = 0;
   int64_t first = 0;  // number of the image's first descriptor
   for (size_t i = 0; i < drawn.size(); ++i) {
@@ -113,7 +115,7 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
   return table;
 }
 
-Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
+Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
                                    Progress& progress, const Vocabulary* tree) {
   BuildVocabularyOptions checked = options;
@@ -133,6 +135,8 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
   }
   Vocabulary vocabulary;
   if (tree != nullptr) {
+    CAIRN_RETURN_IF_ERROR(CheckSameKind(kind, tree->kind, "build_vocabulary: the survey"));
+    vocabulary.kind = tree->kind;
     vocabulary.branching = tree->branching;
     vocabulary.depth = tree->depth;
     vocabulary.nodes = tree->nodes;
@@ -140,9 +144,9 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
     CAIRN_RETURN_IF_ERROR(NumberVocabularyNodes(&vocabulary));
   } else {
     const DescriptorMatrix training =
-        TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed);
-    CAIRN_ASSIGN_OR_RETURN(
-        vocabulary, GrowVocabulary(training, num_descriptors, options.tree, seed, num_threads, progress));
+        TrainingDescriptors(images, kind, num_descriptors, options.max_num_training_descriptors, seed);
+    CAIRN_ASSIGN_OR_RETURN(vocabulary, GrowVocabulary(training, kind, num_descriptors, options.tree, seed,
+                                                      num_threads, progress));
   }
   FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary);
   WeightVocabulary(&vocabulary);

@@ -33,7 +33,7 @@ struct BuildVocabularyOptions {
 };
 OptionTable DescribeOptions(BuildVocabularyOptions* options);
 
-// A survey image's descriptors.
+// A survey image's descriptors, of the survey's kind.
 struct ImageDescriptors {
   ImageId image_id = 0;
   DescriptorMatrix descriptors;
@@ -45,7 +45,7 @@ struct ImageDescriptors {
 // descriptors than branches, each is a word.  Cost: training descriptors * depth * rounds * branching dot
 // products.  Errors: InvalidArgument (an option; images not in ascending order), NoData (no
 // descriptors), Cancelled.
-Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
+Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
                                    Progress& progress, const Vocabulary* tree = nullptr);
 

@@ -8,6 +8,7 @@
 
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_kind_table.h"
 #include "core/line/memory.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
@@ -27,14 +28,17 @@ struct Arguments {
 
 // `survey`: names of the images to read; empty: all.
 Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path,
-                                                      const std::optional<std::set<std::string>>& survey) {
+                                                      const std::optional<std::set<std::string>>& survey,
+                                                      DescriptorKind* kind) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<ImageDescriptors>> {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> database_images, ReadDatabaseImages(database));
+    CAIRN_ASSIGN_OR_RETURN(*kind, ReadDescriptorKind(database, path));
     std::vector<ImageDescriptors> images;
     for (const DatabaseImage& image : database_images) {
       if (survey && survey->count(image.name) == 0) continue;
-      CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors, ReadDatabaseDescriptors(database, image.image_id));
+      CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors,
+                             ReadDatabaseDescriptors(database, image.image_id, *kind));
       images.push_back({image.image_id, std::move(descriptors)});
     }
     return images;
@@ -51,15 +55,17 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("learning the words", arguments.features_path, kMemoryPerFileByte,
                                            environment.memory_mib));
+  DescriptorKind kind;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
-                         ReadDescriptors(arguments.features_path, survey));
+                         ReadDescriptors(arguments.features_path, survey, &kind));
   std::optional<Vocabulary> tree;
   if (!arguments.options.tree_from.empty()) {
     CAIRN_ASSIGN_OR_RETURN(tree, ReadVocabulary(arguments.options.tree_from));
   }
-  CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
-                         BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
-                                         *environment.progress, tree ? &*tree : nullptr));
+  CAIRN_ASSIGN_OR_RETURN(
+      const Vocabulary vocabulary,
+      BuildVocabulary(images, kind, arguments.options, environment.seed, environment.num_threads,
+                      *environment.progress, tree ? &*tree : nullptr));
   CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
   environment.report->in = {{"images", static_cast<int64_t>(images.size())}};
   environment.report->out = {{"words", vocabulary.num_words()}};

@@ -47,7 +47,9 @@ Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const 
     CAIRN_ASSIGN_OR_RETURN(grey, ReadPixels(image));
   }
   const Clock::time_point start = Clock::now();
-  if (!image.features) {
+  if (!image.features && image.finder) {
+    CAIRN_ASSIGN_OR_RETURN(features, image.finder->Find(grey));
+  } else if (!image.features) {
     CAIRN_ASSIGN_OR_RETURN(features, ExtractSift(grey, options.sift));
   }
   result->sift_ms = MillisecondsSince(start);

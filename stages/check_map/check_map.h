@@ -13,6 +13,7 @@
 #include "core/camera/panorama.h"
 #include "core/capture/capture_features.h"
 #include "core/geometry/pose.h"
+#include "core/learned/feature_finder.h"
 #include "core/options/options.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
@@ -73,6 +74,8 @@ struct HeldOutImage {
   std::optional<View> view = std::nullopt;
   // Of an image without a file: where its features are.
   std::optional<FeaturesRow> features = std::nullopt;
+  // Of a map whose features a model finds; null: SIFT.
+  std::shared_ptr<const FeatureFinder> finder = nullptr;
 };
 
 struct HeldOutResult {

@@ -15,8 +15,10 @@
 
 #include "core/blocks/map_documents.h"
 #include "core/capture/capture.h"
+#include "core/features/features.h"
 #include "core/files/file.h"
 #include "core/files/output_path.h"
+#include "core/learned/feature_finder.h"
 #include "core/map/left_out_folder.h"
 #include "runtime/scans/read_scans.h"
 #include "stages/check_map/check_map.h"
@@ -40,6 +42,7 @@ struct Arguments {
   std::string capture_path;
   std::vector<std::string> foreign_paths;
   std::string scans_path;
+  std::string model_path;
   std::string output_path;
   std::string details_path;
   bool json = false;
@@ -149,6 +152,15 @@ Result<Trials> ReadTrials(const Arguments& arguments, const std::shared_ptr<cons
     trials.rows.push_back(std::move(without));
   }
   return trials;
+}
+
+// What finds the features of images to try the map with; null: SIFT, or those that the capture has.
+Result<std::shared_ptr<const FeatureFinder>> FinderOf(const MapRows& rows, const Arguments& arguments) {
+  if (arguments.model_path.empty()) return std::shared_ptr<const FeatureFinder>();
+  CAIRN_ASSIGN_OR_RETURN(auto finder,
+                         FeatureFinder::Make(arguments.options.localizer.sift, arguments.model_path));
+  CAIRN_RETURN_IF_ERROR(CheckSameKind(finder->kind(), rows.descriptor_kind, arguments.model_path));
+  return finder;
 }
 
 // Localizes the images and adds what is known of them; figures are of all trials together.
@@ -301,14 +313,21 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is already sealed; -o is for a map from emit-map",
                      arguments.map_path);
   }
-  CAIRN_ASSIGN_OR_RETURN(const Trials trials, ReadTrials(arguments, map, rows));
+  CAIRN_ASSIGN_OR_RETURN(Trials trials, ReadTrials(arguments, map, rows));
+  std::shared_ptr<const FeatureFinder> finder;
+  if (!trials.trials.empty() || !arguments.foreign_paths.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(finder, FinderOf(rows, arguments));
+  }
+  for (MapTrial& trial : trials.trials) {
+    for (HeldOutImage& image : trial.images) image.finder = finder;
+  }
   CAIRN_ASSIGN_OR_RETURN(CheckMapReport held_out, CheckTrials(trials, rows, arguments, environment));
   WarnOfRejects(held_out);
   CAIRN_RETURN_IF_ERROR(CheckPlan(rows, arguments, environment, &held_out));
   std::optional<CheckMapReport> foreign;
   if (!arguments.foreign_paths.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images,
-                           ReadForeignImages(arguments.foreign_paths));
+    CAIRN_ASSIGN_OR_RETURN(std::vector<HeldOutImage> images, ReadForeignImages(arguments.foreign_paths));
+    for (HeldOutImage& image : images) image.finder = finder;
     CAIRN_ASSIGN_OR_RETURN(
         foreign, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
     WarnOfRejects(*foreign);
@@ -357,6 +376,12 @@ Command CheckMapCommand() {
                 .Add("--foreign", arguments->foreign_paths,
                      "capture or folder of images of another place: none may be localized")
                 .Type("FOLDER");
+            parser
+                .Add("--model", arguments->model_path,
+                     "Learned model that found the features of the map's survey ([extract_features] model): "
+                     "it "
+                     "finds those of the images, too")
+                .Type("FILE.onnx");
             parser
                 .Add("--scans", arguments->scans_path,
                      "Carmen log: laser scan i was taken with held-out image i; it is located in the floor "

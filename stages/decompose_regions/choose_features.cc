@@ -130,7 +130,8 @@ class Chooser {
   Result<std::vector<Candidate>> CandidatesOf(const std::vector<StationIdx>& stations) const {
     const std::vector<FeatureIdx> common = CommonFeatures(stations);
     std::vector<const FeatureClass*> feature_classes;
-    DescriptorMatrix descriptors(static_cast<Eigen::Index>(common.size()), kDescriptorDim);
+    const DescriptorSpace space = classes_.descriptor_kind.space();
+    DescriptorMatrix descriptors(static_cast<Eigen::Index>(common.size()), space.num_values);
     for (const FeatureIdx feature : common) {
       CAIRN_ASSIGN_OR_RETURN(const FeatureClass* feature_class, ClassOf(feature));
       descriptors.row(static_cast<Eigen::Index>(feature_classes.size())) = feature_class->descriptor;
@@ -138,10 +139,10 @@ class Chooser {
     }
     // The best of a descriptor among all is itself, or its equal.
     std::vector<BestTwo> nearest, columns;
-    FindBestTwo(descriptors, descriptors, FastestKernel(), &nearest, &columns);
+    FindBestTwo(descriptors, descriptors, space, FastestKernel(), &nearest, &columns);
     std::vector<Candidate> candidates;
     for (size_t i = 0; i < common.size(); ++i) {
-      const double angle = DescriptorAngleRad(nearest[i].second);
+      const double angle = DescriptorAngleRad(nearest[i].second, space);
       const double distinctiveness =
           angle * angle / (angle * angle + options_.confusion_angle_rad * options_.confusion_angle_rad);
       CAIRN_ASSIGN_OR_RETURN(std::vector<SightInformation> sights,

@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/capture/sessions.h"
+#include "core/features/features.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/files/temporary.h"
@@ -291,8 +292,9 @@ std::string AfterText(const MapRows& rows, const PreviousMap& previous) {
       previous.rows.landmarks.size(), num_kept, num_moved, rows.landmarks.size() - num_kept);
 }
 
-// With the earlier map's landmarks, their bits.
+// With the earlier map's landmarks, their bits; a bit is a bit.
 int BitsAfter(const EmitMapOptions& options, const std::vector<size_t>& first, const Inputs& inputs) {
+  if (inputs.classes.descriptor_kind.type == DescriptorType::kBinary) return 1;
   if (first.empty() || !inputs.previous->rows.descriptor_code) return options.descriptor_bits;
   return std::min(options.descriptor_bits, BitsOfStep(inputs.previous->rows.descriptor_code->step));
 }
@@ -370,6 +372,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
         "is only read where landmarks is fewest or max_bytes is not 0; leave it out"));
   }
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
+  const DescriptorKind& kind = inputs.classes.descriptor_kind;
+  if (!kind.is_sift() && arguments.options.descriptor_code == "transform") {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: descriptor_code = \"transform\" is made for SIFT's cells, and the survey's descriptors "
+        "are of the kind '{}'; leave it out",
+        ToString(kind));
+  }
   MapRows rows;
   std::string guarantee;
   if (is_by_trial) {

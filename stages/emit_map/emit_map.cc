@@ -151,7 +151,7 @@ Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order,
   }
   for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
 
-  rows->descriptors.resize(static_cast<Eigen::Index>(order.size()), kDescriptorDim);
+  rows->descriptors.resize(static_cast<Eigen::Index>(order.size()), classes.descriptor_kind.num_values);
   for (size_t landmark_idx = 0; landmark_idx < order.size(); ++landmark_idx) {
     const FeatureClass& feature_class = classes.classes[order[landmark_idx]];
     rows->landmarks.push_back({.class_id = feature_class.class_id,
@@ -365,10 +365,13 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     row.landmarks.erase(std::unique(row.landmarks.begin(), row.landmarks.end()), row.landmarks.end());
     rows.regions.push_back(std::move(row));
   }
-  const bool stores_transform = StoresTransform(options);
+  rows.descriptor_kind = classes.descriptor_kind;
+  const bool stores_transform = classes.descriptor_kind.is_sift() && StoresTransform(options);
   if (previous != nullptr && stores_transform == previous->rows.descriptor_code.has_value())
     SettleRows(classes, previous->rows, previous->matches, &rows);
-  if (!stores_transform) {
+  if (classes.descriptor_kind.type == DescriptorType::kBinary) {
+    RoundToBits(classes.descriptor_kind, &rows.descriptors);
+  } else if (!stores_transform) {
     QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
   } else if (!rows.descriptor_code) {  // where there is one, it is the earlier map's
     rows.descriptor_code = QuantizeByTransform(TransformStep(options.descriptor_bits), &rows.descriptors);

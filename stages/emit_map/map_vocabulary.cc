@@ -29,6 +29,7 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
                          double landmarks_per_word) {
   const std::vector<int64_t> counts = CountLandmarks(tree, landmark_descriptors);
   Vocabulary cut;
+  cut.kind = tree.kind;
   std::vector<int32_t> kept = {0};  // nodes of `tree`, breadth first
   std::vector<int> depths = {0};
   for (size_t i = 0; i < kept.size(); ++i) {
@@ -44,7 +45,7 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
     cut.branching = std::max(cut.branching, node.num_children);
   }
   cut.depth = depths.back();
-  cut.centres.resize(static_cast<Eigen::Index>(kept.size()), kDescriptorDim);
+  cut.centres.resize(static_cast<Eigen::Index>(kept.size()), tree.centres.cols());
   for (size_t i = 0; i < kept.size(); ++i)
     cut.centres.row(static_cast<Eigen::Index>(i)) = tree.centres.row(kept[i]);
   (void)NumberVocabularyNodes(&cut);  // the counts are right by construction

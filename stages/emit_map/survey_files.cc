@@ -16,6 +16,8 @@ Result<SurveyData> ReadSurveyFiles(const SurveyFiles& files) {
   CAIRN_ASSIGN_OR_RETURN(data.parts.world, ReadWorld(files.world_path));
   CAIRN_ASSIGN_OR_RETURN(data.parts.decomposition, ReadDecomposition(files.regions_path));
   CAIRN_ASSIGN_OR_RETURN(data.vocabulary, ReadVocabulary(files.vocabulary_path));
+  CAIRN_RETURN_IF_ERROR(
+      CheckSameKind(data.vocabulary.kind, data.classes.descriptor_kind, files.vocabulary_path));
   if (!files.appearance_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(data.parts.appearance, ReadAppearance(files.appearance_path));
   }

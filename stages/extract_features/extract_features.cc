@@ -8,6 +8,9 @@
 
 #include "core/base/parallel.h"
 #include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_kind_table.h"
+#include "core/features/features.h"
+#include "core/learned/feature_finder.h"
 #include "stages/extract_features/extract_image.h"
 #include "stages/extract_features/resources.h"
 
@@ -25,6 +28,7 @@ CREATE TABLE cairn_rejects (name TEXT NOT NULL, reason TEXT NOT NULL);
 struct ExtractionRun {
   const Capture& capture;
   const ExtractFeaturesOptions& options;
+  std::shared_ptr<const FeatureFinder> finder;
   std::string masks;                 // absolute, "" if none
   std::vector<CaptureImage> images;  // the run's share
   EarlierExtractions earlier;
@@ -39,8 +43,8 @@ Result<std::vector<Extraction>> ExtractBatch(int64_t begin, int num_threads, Pro
   ParallelFor(static_cast<int64_t>(batch.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
     const CaptureImage& image = run->images[begin + i];
-    Result<Extraction> extraction =
-        ExtractImage(run->capture, image, run->options, FindMask(run->masks, image.name), &run->earlier);
+    Result<Extraction> extraction = ExtractImage(run->capture, image, run->options, *run->finder,
+                                                 FindMask(run->masks, image.name), &run->earlier);
     if (extraction.ok()) {
       batch[i] = std::move(*extraction);
     } else {
@@ -76,6 +80,12 @@ void WriteLandmarkImages(const std::vector<ImageId>& images, SQLite::Database& d
   }
 }
 
+Error OtherKind(const View& view, const std::pair<DescriptorKind, std::string>& first) {
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: descriptors of the kind '{}', but those of {} are '{}': a survey has one kind",
+                   view.name, ToString(view.features.kind), first.second, ToString(first.first));
+}
+
 Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite::Database& database) {
   for (const auto& [camera_id, camera] : run->capture.cameras) {
     const bool is_panorama = camera.model == CameraModel::kEquirectangular;
@@ -86,6 +96,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
   ExtractFeaturesSummary& summary = run->summary;
   ImageId next_id = 1;
   std::vector<ImageId> of_landmarks;
+  std::optional<std::pair<DescriptorKind, std::string>> kind;  // and the image that has it
   for (int64_t begin = 0; begin < static_cast<int64_t>(run->images.size()); begin += kNumImagesPerBatch) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Extraction> batch,
                            ExtractBatch(begin, num_threads, progress, run));
@@ -98,6 +109,8 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
       if (batch[i].is_elsewhere) continue;
       run->entries.push_back(EntryOf(batch[i], next_id));
       for (const View& view : batch[i].views) {
+        if (!kind) kind.emplace(view.features.kind, view.name);
+        if (view.features.kind != kind->first) return OtherKind(view, *kind);
         const ImageId image_id = next_id++;
         WriteDatabaseImage(database, {image_id, view.name, image.camera_id});
         WriteDatabaseFeatures(database, image_id, view.features);
@@ -113,6 +126,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
       summary.num_taken_over += batch[i].is_taken_over ? 1 : 0;
     }
   }
+  if (kind) WriteDescriptorKind(database, kind->first);
   WriteRejects(&summary.rejects, database);
   WriteLandmarkImages(of_landmarks, database);
   return Ok();
@@ -152,6 +166,10 @@ std::vector<std::string> ListInputs(const ExtractionRun& run) {
 OptionTable DescribeOptions(ExtractFeaturesOptions* options) {
   OptionTable table = DescribeOptions(&options->sift);
   for (OptionTable::value_type& option : DescribeOptions(&options->panorama)) table.push_back(option);
+  table.push_back({.name = "model",
+                   .value = &options->model,
+                   .help = "learned model that finds features in place of SIFT: an ONNX file with XFeat's "
+                           "outputs; absolute or relative to the recipe; empty: SIFT"});
   table.push_back({.name = "masks",
                    .value = &options->masks,
                    .help = "folder of masks NAME.png, absolute or relative to the capture; pixels that are "
@@ -170,8 +188,10 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
   if (!masks.empty() && !fs::is_directory(masks, error)) {
     return MakeError(ErrorCode::kNotFound, "option masks: {} is not a folder", masks);
   }
+  CAIRN_ASSIGN_OR_RETURN(auto finder, FeatureFinder::Make(options.sift, options.model));
   ExtractionRun run{.capture = capture,
                     .options = options,
+                    .finder = std::move(finder),
                     .masks = masks,
                     .images = reuse.shard ? ImagesOfShard(capture.images, *reuse.shard) : capture.images};
   ReuseSources& named = reuse.shard ? run.earlier.to_leave : run.earlier.to_take_over;
@@ -179,6 +199,7 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
                          AddReuseSources(reuse, features_path, &named, &run.earlier.to_take_over));
   run.summary.rejects = capture.rejects;
   run.summary.inputs = ListInputs(run);
+  if (!options.model.empty()) run.summary.inputs.push_back(options.model);
   cv::setNumThreads(1);  // images are the unit of parallel work
   progress.Begin("extract features", static_cast<int64_t>(run.images.size()), "images");
   const Status status =

@@ -13,8 +13,8 @@
 
 namespace cairn::extract_features {
 
-// Finds the SIFT features of every survey image and writes them as a COLMAP database.  First stage of the
-// line; after it: match_features and build_vocabulary.
+// Finds the features of every survey image, SIFT's or a learned model's, and writes them as a COLMAP
+// database.  First stage of the line; after it: match_features and build_vocabulary.
 //
 // Images get ids 1, 2, ... in the order of their names.  An image that cannot be read, or whose size is not
 // its camera's, is listed as rejected; the others are processed.  A mask MASKS/NAME.png (or MASKS/NAME with
@@ -28,6 +28,8 @@ namespace cairn::extract_features {
 struct ExtractFeaturesOptions {
   SiftOptions sift;
   PanoramaOptions panorama;
+  // Model that finds features in place of SIFT, an ONNX file (core/learned/learned_model.h); empty: none.
+  std::string model;
   // Folder of masks, absolute or relative to the capture; empty: none.
   std::string masks;
 };

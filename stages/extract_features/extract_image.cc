@@ -4,6 +4,7 @@
 
 #include "core/capture/image_file.h"
 #include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_kind_table.h"
 #include "core/features/hash_features.h"
 #include "core/files/file.h"
 
@@ -14,7 +15,7 @@ namespace fs = std::filesystem;
 
 // Of a camera only its size and its kind matter (a panorama's has no parameters).
 ContentHash KeyOf(const Camera& camera, ContentHash image, const std::optional<ContentHash>& mask,
-                  ExtractFeaturesOptions options) {
+                  ExtractFeaturesOptions options, const FeatureFinder& finder) {
   ContentHasher key;
   key.Text("features").Hash(image).UInt(mask ? 1 : 0).Hash(mask.value_or(ContentHash()));
   key.UInt(camera.width)
@@ -23,6 +24,7 @@ ContentHash KeyOf(const Camera& camera, ContentHash image, const std::optional<C
       .Text(OptionsToml(DescribeOptions(&options.sift)));
   if (camera.model == CameraModel::kEquirectangular)
     key.Text(OptionsToml(DescribeOptions(&options.panorama)));
+  if (!finder.kind().is_sift()) key.Text(ToString(finder.kind())).Hash(finder.model_hash());
   return key.Finish();
 }
 
@@ -49,13 +51,15 @@ std::optional<std::vector<View>> FindViews(const ContentHash& key, const std::ve
   return sources->Find(key, [&](const ReuseEntry& entry, ReuseSources::Source& source) {
     std::optional<std::vector<View>> views;
     if (entry.count != static_cast<int64_t>(names.size())) return views;
+    const auto kind = ReadDescriptorKind(source.Database(), DatabasePath(source.Database()));
+    if (!kind.ok()) return views;
     views.emplace();
     for (size_t i = 0; i < names.size(); ++i) {
       const auto image_id = static_cast<ImageId>(entry.row + static_cast<int64_t>(i));
       auto keypoints = ReadDatabaseKeypoints(source.Database(), image_id);
-      auto descriptors = ReadDatabaseDescriptors(source.Database(), image_id);
+      auto descriptors = ReadDatabaseDescriptors(source.Database(), image_id, *kind);
       if (!keypoints.ok() || !descriptors.ok()) return std::optional<std::vector<View>>();
-      views->push_back({names[i], {std::move(*keypoints), std::move(*descriptors)}});
+      views->push_back({names[i], {std::move(*keypoints), std::move(*descriptors), *kind}});
     }
     if (HashViews(*views) != entry.contents) views.reset();
     return views;
@@ -64,7 +68,8 @@ std::optional<std::vector<View>> FindViews(const ContentHash& key, const std::ve
 
 Result<std::vector<View>> ExtractPanorama(const std::vector<std::string>& names, const cv::Mat& grey,
                                           const cv::Mat& mask, const Camera& camera,
-                                          const ExtractFeaturesOptions& options) {
+                                          const ExtractFeaturesOptions& options,
+                                          const FeatureFinder& finder) {
   if (!mask.empty() && mask.size() != grey.size()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "a mask of {} x {} px does not fit the panorama of {} x {} px", mask.cols, mask.rows,
@@ -76,8 +81,8 @@ Result<std::vector<View>> ExtractPanorama(const std::vector<std::string>& names,
   for (int view = 0; view < num_views; ++view) {
     cv::Mat view_mask;
     if (!mask.empty()) view_mask = CutPanoramaView(mask, view_camera, view, num_views) == 255;
-    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(CutPanoramaView(grey, view_camera, view, num_views),
-                                                          options.sift, view_mask));
+    CAIRN_ASSIGN_OR_RETURN(Features features,
+                           finder.Find(CutPanoramaView(grey, view_camera, view, num_views), view_mask));
     KeepSectorOfView(view_camera, num_views, &features);
     views.push_back({names[view], std::move(features)});
   }
@@ -87,7 +92,7 @@ Result<std::vector<View>> ExtractPanorama(const std::vector<std::string>& names,
 Result<std::vector<View>> ExtractViews(const std::string& path, const std::string& bytes,
                                        const std::string& mask_path, const std::string& mask_bytes,
                                        const std::vector<std::string>& names, const Camera& camera,
-                                       const ExtractFeaturesOptions& options) {
+                                       const ExtractFeaturesOptions& options, const FeatureFinder& finder) {
   CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, DecodeGreyImage(bytes, path));
   if (grey.cols != camera.width || grey.rows != camera.height) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} px, but its camera {} has {} x {} px", path,
@@ -98,12 +103,12 @@ Result<std::vector<View>> ExtractViews(const std::string& path, const std::strin
     CAIRN_ASSIGN_OR_RETURN(mask, DecodeGreyImage(mask_bytes, mask_path));
   }
   if (camera.model == CameraModel::kEquirectangular)
-    return ExtractPanorama(names, grey, mask, camera, options);
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options.sift, mask));
+    return ExtractPanorama(names, grey, mask, camera, options, finder);
+  CAIRN_ASSIGN_OR_RETURN(Features features, finder.Find(grey, mask));
   return std::vector<View>{{names.front(), std::move(features)}};
 }
 
-// The features that the capture has of an image without a file: they are the image's contents.
+// The features that the capture has of an image: they are its contents.
 Result<Extraction> TakeGivenFeatures(const FeaturesRow& row, const CaptureImage& image, const Camera& camera,
                                      EarlierExtractions* earlier) {
   if (camera.model == CameraModel::kEquirectangular) {
@@ -115,7 +120,10 @@ Result<Extraction> TakeGivenFeatures(const FeaturesRow& row, const CaptureImage&
   CAIRN_ASSIGN_OR_RETURN(Features features, ReadCaptureFeatures(row, camera));
   const ContentHash contents = HashFeatures(features.keypoints, features.descriptors);
   extraction.content_hash = fmt::format("{:016x}{:016x}", contents.high, contents.low);
-  extraction.key = ContentHasher().Text("given features").Hash(contents).Finish();
+  ContentHasher key;
+  key.Text("given features").Hash(contents);
+  if (!features.kind.is_sift()) key.Text(ToString(features.kind));
+  extraction.key = key.Finish();
   extraction.are_landmarks = row.are_landmarks;
   if (FindViews(extraction.key, {image.name}, &earlier->to_leave)) {
     extraction.is_elsewhere = true;
@@ -139,8 +147,8 @@ std::string FindMask(const std::string& masks, const std::string& name) {
 }
 
 Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
-                                const ExtractFeaturesOptions& options, const std::string& mask_path,
-                                EarlierExtractions* earlier) {
+                                const ExtractFeaturesOptions& options, const FeatureFinder& finder,
+                                const std::string& mask_path, EarlierExtractions* earlier) {
   if (const FeaturesRow* row = capture.FeaturesOf(image); row != nullptr)
     return TakeGivenFeatures(*row, image, capture.cameras.at(image.camera_id), earlier);
   Extraction extraction;
@@ -154,7 +162,7 @@ Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& imag
     mask_hash = HashContents(mask_bytes);
   }
   const Camera& camera = capture.cameras.at(image.camera_id);
-  extraction.key = KeyOf(camera, HashContents(bytes), mask_hash, options);
+  extraction.key = KeyOf(camera, HashContents(bytes), mask_hash, options, finder);
   const std::vector<std::string> names = ViewNames(image, camera, options.panorama);
   if (FindViews(extraction.key, names, &earlier->to_leave)) {
     extraction.is_elsewhere = true;
@@ -166,7 +174,7 @@ Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& imag
     return extraction;
   }
   CAIRN_ASSIGN_OR_RETURN(extraction.views,
-                         ExtractViews(path, bytes, mask_path, mask_bytes, names, camera, options));
+                         ExtractViews(path, bytes, mask_path, mask_bytes, names, camera, options, finder));
   return extraction;
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/capture/capture.h"
 #include "core/features/features.h"
+#include "core/learned/feature_finder.h"
 #include "core/line/reuse.h"
 #include "stages/extract_features/extract_features.h"
 
@@ -41,8 +42,8 @@ std::string FindMask(const std::string& masks, const std::string& name);
 // that the capture has, without its mask.  May be called from any thread.
 // Errors: those of the image and its mask, which make it a reject.
 Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
-                                const ExtractFeaturesOptions& options, const std::string& mask_path,
-                                EarlierExtractions* earlier);
+                                const ExtractFeaturesOptions& options, const FeatureFinder& finder,
+                                const std::string& mask_path, EarlierExtractions* earlier);
 
 // Where a later run finds this one: `row` is the id of the first view, `count` their number.
 ReuseEntry EntryOf(const Extraction& extraction, ImageId first_view);

@@ -15,7 +15,7 @@ namespace {
 // file come on top.
 constexpr int64_t kPyramidBytesPerPixel = 76;
 constexpr int64_t kImageBytesPerPixel = 8;
-constexpr int64_t kBytesPerKeypoint = kDescriptorDim + sizeof(Keypoint);
+constexpr int64_t kBytesPerKeypoint = kSiftDescriptorDim + sizeof(Keypoint);
 // SIFT finds at most one keypoint per this many pixels.
 constexpr int64_t kPixelsPerKeypoint = 100;
 constexpr double kKeypointsOfThoseAllowed = 0.75;

@@ -16,17 +16,17 @@ namespace {
 constexpr size_t kFewPairs = 64 * 64;
 
 // The smallest dot product of two centres that lie within `angle_rad` of each other.
-int32_t LeastDot(double angle_rad) {
-  int32_t low = 0, high = static_cast<int32_t>(kSquaredDescriptorNorm);
+int32_t LeastDot(double angle_rad, const DescriptorSpace& space) {
+  int32_t low = 0, high = static_cast<int32_t>(space.squared_norm);
   while (low < high) {
     const int32_t middle = (low + high) / 2;
-    if (DescriptorAngleRad(middle) <= angle_rad) {
+    if (DescriptorAngleRad(middle, space) <= angle_rad) {
       high = middle;
     } else {
       low = middle + 1;
     }
   }
-  return low;
+  return space.offset == 0 ? low : std::max(low, 1);  // of others, what is at a right angle does not count
 }
 
 // All pairs of classes of which one lies within the other's radius.  Classes are compared in the order of
@@ -34,15 +34,18 @@ int32_t LeastDot(double angle_rad) {
 // product with a set of later columns shows whether the set has a look-alike of the row.
 class LookAlikeSearch {
  public:
-  LookAlikeSearch(const std::vector<ClassAppearance>& classes, double ratio)
-      : centres_(classes.size(), kDescriptorDim), order_(classes.size()), least_dots_(classes.size()) {
+  LookAlikeSearch(const std::vector<ClassAppearance>& classes, const DescriptorSpace& space, double ratio)
+      : space_(space),
+        centres_(classes.size(), space.num_values),
+        order_(classes.size()),
+        least_dots_(classes.size()) {
     std::iota(order_.begin(), order_.end(), 0);
     std::sort(order_.begin(), order_.end(), [&](int a, int b) {
       return std::tie(classes[b].radius_rad, a) < std::tie(classes[a].radius_rad, b);
     });
     for (size_t i = 0; i < order_.size(); ++i) {
       centres_.row(static_cast<int>(i)) = classes[order_[i]].centre;
-      least_dots_[i] = LeastDot(ratio * classes[order_[i]].radius_rad);
+      least_dots_[i] = LeastDot(ratio * classes[order_[i]].radius_rad, space);
     }
   }
 
@@ -71,14 +74,14 @@ class LookAlikeSearch {
     if (rows.size() * columns.size() <= kFewPairs) {
       for (const int row : rows) {
         for (const int column : columns) {
-          const int32_t dot = DescriptorDot(centres_.row(row).data(), centres_.row(column).data());
+          const int32_t dot = DescriptorDot(centres_.row(row).data(), centres_.row(column).data(), space_);
           if (dot >= least_dots_[row]) visit(order_[row], order_[column]);
         }
       }
       return;
     }
     std::vector<BestTwo> row_bests, column_bests;
-    FindBestTwo(Centres(rows), Centres(columns), FastestKernel(), &row_bests, &column_bests);
+    FindBestTwo(Centres(rows), Centres(columns), space_, FastestKernel(), &row_bests, &column_bests);
     // Rows with one look-alike are done; those with more are searched again, with the columns that may
     // be look-alikes.
     std::vector<int> other_rows, other_columns;
@@ -103,11 +106,12 @@ class LookAlikeSearch {
   }
 
   DescriptorMatrix Centres(const std::vector<int>& ranks) const {
-    DescriptorMatrix centres(ranks.size(), kDescriptorDim);
+    DescriptorMatrix centres(ranks.size(), space_.num_values);
     for (size_t i = 0; i < ranks.size(); ++i) centres.row(static_cast<int>(i)) = centres_.row(ranks[i]);
     return centres;
   }
 
+  DescriptorSpace space_;
   DescriptorMatrix centres_;         // by rank: the widest class first
   std::vector<int> order_;           // class of each rank
   std::vector<int32_t> least_dots_;  // by rank, ascending: with it or more, a later class is a look-alike
@@ -115,15 +119,18 @@ class LookAlikeSearch {
 
 }  // namespace
 
-void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearance* appearance) {
-  DescriptorSum sum = DescriptorSum::Zero();
+void DescribeClass(const std::vector<const uint8_t*>& descriptors, const DescriptorSpace& space,
+                   ClassAppearance* appearance) {
+  Eigen::Matrix<double, 1, Eigen::Dynamic> sum =
+      Eigen::Matrix<double, 1, Eigen::Dynamic>::Zero(space.num_values);
   for (const uint8_t* descriptor : descriptors) {
-    sum += Eigen::Map<const Eigen::Matrix<uint8_t, 1, kDescriptorDim>>(descriptor).cast<double>();
+    sum += Eigen::Map<const DescriptorRow>(descriptor, space.num_values).cast<double>();
   }
-  appearance->centre = MeanDescriptor(sum);
+  appearance->centre = MeanDescriptor(sum, static_cast<int64_t>(descriptors.size()), space);
   double squared_sum = 0;
   for (const uint8_t* descriptor : descriptors) {
-    const double angle = DescriptorAngleRad(DescriptorDot(descriptor, appearance->centre.data()));
+    const double angle =
+        DescriptorAngleRad(DescriptorDot(descriptor, appearance->centre.data(), space), space);
     squared_sum += angle * angle;
   }
   // [Sala06 §VI-B] "the radius of the classes in the feature space": root mean square about the centre
@@ -132,11 +139,11 @@ void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearan
 }
 
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
-                                     const FindAmbiguousOptions& options) {
+                                     const DescriptorSpace& space, const FindAmbiguousOptions& options) {
   std::vector<Ambiguity> ambiguity(classes.size(), Ambiguity::kNone);
   if (options.min_separation_ratio <= 0) return ambiguity;
   // [Sala06 §VI-B] where the distance is "not significantly larger than the radius", both classes go
-  LookAlikeSearch(classes, options.min_separation_ratio).ForEachPair([&](int i, int k) {
+  LookAlikeSearch(classes, space, options.min_separation_ratio).ForEachPair([&](int i, int k) {
     if ((classes[i].position - classes[k].position).norm() > options.max_duplicate_distance_m) {
       ambiguity[i] = ambiguity[k] = Ambiguity::kAmbiguous;
       return;

@@ -12,14 +12,15 @@ namespace cairn::group_classes {
 // What the ambiguity rule reads of a class: centre of its descriptors, its radius (root mean square angle
 // between its descriptors and the centre, radians), its place, and how many keypoints it has.
 struct ClassAppearance {
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> centre;
+  DescriptorRow centre = DescriptorRow::Zero(kSiftDescriptorDim);
   double radius_rad = 0;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   int num_observations = 0;
 };
 
-// Mean of RootSIFT descriptors, renormalised to norm 512 and quantised, and the radius about it.
-void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearance* appearance);
+// Mean of descriptors, as one of them, and the radius about it.
+void DescribeClass(const std::vector<const uint8_t*>& descriptors, const DescriptorSpace& space,
+                   ClassAppearance* appearance);
 
 struct FindAmbiguousOptions {
   // Two classes are told apart when their centres lie farther apart than this many times the larger of their
@@ -41,6 +42,6 @@ enum class Ambiguity : uint8_t { kNone, kAmbiguous, kDuplicate };
 // one's radius reaches the other.  Exact, whatever the order of the classes; O(n^2) dot products, by the
 // kernels of core/features/descriptor_matcher.h, and more where look-alikes are dense.
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
-                                     const FindAmbiguousOptions& options);
+                                     const DescriptorSpace& space, const FindAmbiguousOptions& options);
 
 }  // namespace cairn::group_classes

@@ -8,6 +8,7 @@
 #include "core/base/parallel.h"
 #include "core/capture/sessions.h"
 #include "core/colmap/landmark_images.h"
+#include "core/features/descriptor_kind_table.h"
 #include "core/files/database.h"
 #include "core/structure/union_matches.h"
 #include "stages/group_classes/make_classes.h"
@@ -171,15 +172,16 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
     MatchedFeatures matched;
     CAIRN_ASSIGN_OR_RETURN(matched.cameras, ReadDatabaseCameras(database));
     CAIRN_ASSIGN_OR_RETURN(matched.images, ReadDatabaseImages(database));
+    CAIRN_ASSIGN_OR_RETURN(const DescriptorKind kind, ReadDescriptorKind(database, matches_path));
     std::map<ImageId, size_t> num_keypoints;
     for (const DatabaseImage& image : matched.images) {
       if (matched.cameras.count(image.camera_id) == 0) {
         return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
                          matches_path, image.name, image.camera_id);
       }
-      Features features;
+      Features features{.keypoints = {}, .descriptors = {}, .kind = kind};
       CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
-      CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id));
+      CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
       if (static_cast<size_t>(features.descriptors.rows()) != features.keypoints.size()) {
         return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
                          matches_path, image.name, features.keypoints.size(), features.descriptors.rows());
@@ -252,6 +254,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
 
   Classes& classes = result.classes;
   classes.cameras = posed.cameras;
+  if (!matched.features.empty()) classes.descriptor_kind = matched.features.front().kind;
   auto found = classes.cameras.begin();
   for (const auto& [camera_id, stated] : matched.cameras) {
     if (found->model != stated.model || found->params != stated.params)

@@ -32,12 +32,14 @@ std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& t
 ClassAppearance AppearanceOf(const MatchedFeatures& matched, const Track& track,
                              const Triangulation& triangulation, const std::vector<int>& matched_idx) {
   std::vector<const uint8_t*> descriptors;
+  DescriptorSpace space;
   for (const int i : triangulation.inliers) {
     const Features& features = matched.features[matched_idx[track[i].image_idx]];
+    space = features.kind.space();
     descriptors.push_back(features.descriptors.row(track[i].keypoint_idx).data());
   }
   ClassAppearance appearance;
-  DescribeClass(descriptors, &appearance);
+  DescribeClass(descriptors, space, &appearance);
   appearance.position = triangulation.position;
   appearance.num_observations = static_cast<int>(triangulation.inliers.size());
   return appearance;
@@ -85,7 +87,8 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
     candidates.push_back(t);
     appearances.push_back(AppearanceOf(matched, tracks[t], triangulations[t], matched_idx));
   }
-  const std::vector<Ambiguity> ambiguity = FindAmbiguous(appearances, options.ambiguity);
+  const std::vector<Ambiguity> ambiguity =
+      FindAmbiguous(appearances, classes->descriptor_kind.space(), options.ambiguity);
   classes->classes.reserve(std::count(ambiguity.begin(), ambiguity.end(), Ambiguity::kNone));
   for (size_t i = 0; i < candidates.size(); ++i) {
     const size_t t = candidates[i];

@@ -59,7 +59,9 @@ class KeypointChange {
 
  private:
   double LogRatio(const Match& match) const {
-    return std::log(keypoints2_[match.idx2].scale / keypoints1_[match.idx1].scale);
+    const float scale1 = keypoints1_[match.idx1].scale, scale2 = keypoints2_[match.idx2].scale;
+    return scale1 > 0 && scale2 > 0 ? std::log(scale2 / scale1)
+                                    : 0;  // not measured: nothing speaks against it
   }
   double Turn(const Match& match) const {
     return keypoints2_[match.idx2].orientation - keypoints1_[match.idx1].orientation;
@@ -71,11 +73,12 @@ class KeypointChange {
   double log_ratio_ = 0, turn_ = 0;
 };
 
-bool Passes(const BestTwoCandidates& candidates, const GuidedMatchOptions& options) {
+bool Passes(const BestTwoCandidates& candidates, const DescriptorSpace& space,
+            const GuidedMatchOptions& options) {
   if (candidates.idx < 0) return false;
-  const double best = DescriptorAngleRad(candidates.best);
+  const double best = DescriptorAngleRad(candidates.best, space);
   return best <= options.max_angle_rad &&
-         (candidates.second < 0 || best <= options.max_ratio * DescriptorAngleRad(candidates.second));
+         (candidates.second < 0 || best <= options.max_ratio * DescriptorAngleRad(candidates.second, space));
 }
 
 // Best two of every keypoint of both images over the pairs that are offered, and the matches that follow.
@@ -85,6 +88,7 @@ class CandidateMatcher {
                    const GuidedMatchOptions& options)
       : options_(options),
         change_(view1, view2, inliers, options),
+        space_(view1.space),
         descriptors1_(*view1.descriptors),
         descriptors2_(*view2.descriptors),
         is_matched1_(view1.bearings->size(), 0),
@@ -99,17 +103,18 @@ class CandidateMatcher {
   bool IsNeeded(int idx1, int idx2) const { return !(is_matched1_[idx1] && is_matched2_[idx2]); }
 
   void Offer(int idx1, int idx2) {
-    const int32_t dot = DescriptorDot(descriptors1_.row(idx1).data(), descriptors2_.row(idx2).data());
+    const int32_t dot = DescriptorDot(descriptors1_.row(idx1).data(), descriptors2_.row(idx2).data(), space_);
     best1_[idx1].Offer(dot, idx2);
     best2_[idx2].Offer(dot, idx1);
   }
 
   std::vector<Match> Matches() && {
     for (uint32_t idx1 = 0; idx1 < best1_.size(); ++idx1) {
-      if (is_matched1_[idx1] || !Passes(best1_[idx1], options_)) continue;
+      if (is_matched1_[idx1] || !Passes(best1_[idx1], space_, options_)) continue;
       const uint32_t idx2 = best1_[idx1].idx;
       if (is_matched2_[idx2] || best2_[idx2].idx != static_cast<int32_t>(idx1)) continue;
-      if (Passes(best2_[idx2], options_) && change_.Explains({idx1, idx2})) matches_.push_back({idx1, idx2});
+      if (Passes(best2_[idx2], space_, options_) && change_.Explains({idx1, idx2}))
+        matches_.push_back({idx1, idx2});
     }
     std::sort(matches_.begin(), matches_.end());
     return std::move(matches_);
@@ -118,6 +123,7 @@ class CandidateMatcher {
  private:
   const GuidedMatchOptions& options_;
   const KeypointChange change_;
+  const DescriptorSpace space_;
   const DescriptorMatrix& descriptors1_;
   const DescriptorMatrix& descriptors2_;
   std::vector<uint8_t> is_matched1_, is_matched2_;

@@ -26,6 +26,7 @@ struct GuidedView {
   const std::vector<Keypoint>* keypoints = nullptr;
   const std::vector<Eigen::Vector3d>* bearings = nullptr;
   const DescriptorMatrix* descriptors = nullptr;
+  DescriptorSpace space;
 };
 
 // Matches again where the geometry of two views is known: each keypoint without a match looks for its best

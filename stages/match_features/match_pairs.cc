@@ -49,9 +49,9 @@ Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImag
       }
       if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
       const MatchImage& image = images.images[idx];
-      CAIRN_ASSIGN_OR_RETURN(
-          ImageFeatures features,
-          ReadImageFeatures(database, image, images.cameras.at(image.camera_id), IsGuided(image, options)));
+      CAIRN_ASSIGN_OR_RETURN(ImageFeatures features,
+                             ReadImageFeatures(database, image, images.cameras.at(image.camera_id),
+                                               images.descriptor_kind, IsGuided(image, options)));
       result.emplace(idx, std::make_shared<const ImageFeatures>(std::move(features)));
     }
   }
@@ -65,8 +65,12 @@ struct MatchedPair {
 
 ViewForVerification ForVerification(const MatchImages& images, const MatchImage& image,
                                     const ImageFeatures& features) {
-  return {&images.cameras.at(image.camera_id), &features.keypoints, &features.bearings,
-          features.descriptors.rows() > 0 ? &features.descriptors : nullptr, image.cam_from_world};
+  return {&images.cameras.at(image.camera_id),
+          &features.keypoints,
+          &features.bearings,
+          features.descriptors.rows() > 0 ? &features.descriptors : nullptr,
+          features.space,
+          image.cam_from_world};
 }
 
 MatchedPair MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
@@ -121,7 +125,8 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
   const int64_t budget = static_cast<int64_t>(options.memory_budget_mib) << 20;
   std::vector<int64_t> num_bytes;
   for (const MatchImage& image : images.images)
-    num_bytes.push_back(ImageFeatures::NumBytes(image.num_features, IsGuided(image, options.verification)));
+    num_bytes.push_back(ImageFeatures::NumBytes(image.num_features, images.descriptor_kind,
+                                                IsGuided(image, options.verification)));
   const std::vector<int64_t> ends = CutIntoStretches(pairs, num_bytes, budget / 2);
   FeaturesOfImages features;
   int64_t begin = 0;

@@ -40,8 +40,8 @@ using TakeGeometry = std::function<void(const TwoViewGeometry& geometry, int num
 // Matches and verifies `pairs` (indices into images.images; sorted along the curve here) and hands each
 // result to `take`, in the curve's order and on the calling thread.  The features of one stretch of the curve
 // are in memory while a second thread reads those of the next: together within the budget.  Same calls for
-// any budget and number of threads.  Cost: pairs * features^2 * 128 multiply-adds.  Memory: the budget, and 8
-// bytes per pair.  Errors: Corrupt, Cancelled; throws SQLite::Exception as the readers do.
+// any budget and number of threads.  Cost: pairs * features^2 * values multiply-adds.  Memory: the budget,
+// and 8 bytes per pair.  Errors: Corrupt, Cancelled; throws SQLite::Exception as the readers do.
 Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPairs pairs,
                   const MatchPairsOptions& options, int num_threads, Progress& progress,
                   const TakeGeometry& take);

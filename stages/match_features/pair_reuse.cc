@@ -55,7 +55,10 @@ std::optional<TwoViewGeometry> ReadRow(SQLite::Database& database, int64_t pair_
 PairKeys::PairKeys(SQLite::Database& features, const MatchImages& images, const MatchPairsOptions& options)
     : features_(features), images_(images), image_keys_(images.images.size()) {
   MatchPairsOptions described = options;
-  options_ = ContentHasher().Text("pair").Text(OptionsToml(DescribeOptions(&described))).Finish();
+  ContentHasher hasher;
+  hasher.Text("pair").Text(OptionsToml(DescribeOptions(&described)));
+  if (!images.descriptor_kind.is_sift()) hasher.Text(ToString(images.descriptor_kind));
+  options_ = hasher.Finish();
 }
 
 Result<ContentHash> PairKeys::OfImage(int idx) {
@@ -64,7 +67,7 @@ Result<ContentHash> PairKeys::OfImage(int idx) {
   CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
                          ReadDatabaseKeypoints(features_, image.image_id));
   CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                         ReadDatabaseDescriptors(features_, image.image_id));
+                         ReadDatabaseDescriptors(features_, image.image_id, images_.descriptor_kind));
   image_keys_[idx] = ContentHasher()
                          .Hash(HashFeatures(keypoints, descriptors))
                          .Hash(HashCamera(images_.cameras.at(image.camera_id)))

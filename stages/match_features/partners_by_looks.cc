@@ -21,7 +21,8 @@ ImageStep WordsStep(const Vocabulary& vocabulary, MatchRun* run) {
   return {.name = "words",
           .key = [run, tree = HashTree(vocabulary)](int idx) -> Result<ContentHash> {
             CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                                   ReadDatabaseDescriptors(run->features, run->images.images[idx].image_id));
+                                   ReadDatabaseDescriptors(run->features, run->images.images[idx].image_id,
+                                                           run->images.descriptor_kind));
             return ContentHasher().Text("words").Hash(tree).Hash(HashFeatures({}, descriptors)).Finish();
           },
           .compute =

@@ -201,8 +201,8 @@ Model EightPointCameras(bool has_intrinsics, const Correspondences& c, const Lim
 std::vector<Match> GuidedInliers(const ViewForVerification& view1, const ViewForVerification& view2,
                                  const Model& model, const Limits& limits, const std::vector<Match>& inliers,
                                  const VerifyPairOptions& options) {
-  const GuidedView guided1{view1.keypoints, view1.bearings, view1.descriptors},
-      guided2{view2.keypoints, view2.bearings, view2.descriptors};
+  const GuidedView guided1{view1.keypoints, view1.bearings, view1.descriptors, view1.space},
+      guided2{view2.keypoints, view2.bearings, view2.descriptors, view2.space};
   if (model.is_homography)
     return GuideByHomography(guided1, guided2, *model.H, limits.homography, inliers, options.guided);
   return GuideByEpipolarLines(guided1, guided2, model.Epipolar(), limits.epipolar, inliers, options.guided);

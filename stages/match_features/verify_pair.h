@@ -63,6 +63,7 @@ struct ViewForVerification {
   const std::vector<Eigen::Vector3d>* bearings = nullptr;
   // Null: no guided matching.
   const DescriptorMatrix* descriptors = nullptr;
+  DescriptorSpace space;
   std::optional<Pose> cam_from_world;
 };
 

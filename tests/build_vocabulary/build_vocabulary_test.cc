@@ -14,9 +14,9 @@ namespace cairn::build_vocabulary {
 namespace {
 
 // A random descriptor with squared norm near 512^2.
-Eigen::Matrix<uint8_t, 1, kDescriptorDim> RandomDescriptor(Random& random) {
-  Eigen::Matrix<double, 1, kDescriptorDim> direction;
-  for (int i = 0; i < kDescriptorDim; ++i) direction[i] = std::pow(random.Uniform(), 3);
+Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> RandomDescriptor(Random& random) {
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> direction;
+  for (int i = 0; i < kSiftDescriptorDim; ++i) direction[i] = std::pow(random.Uniform(), 3);
   direction *= 512 / direction.norm();
   return direction.array().min(255).round().cast<uint8_t>();
 }
@@ -27,7 +27,7 @@ std::vector<ImageDescriptors> RandomImages(int num_images, int num_descriptors, 
   std::vector<ImageDescriptors> images(num_images);
   for (int i = 0; i < num_images; ++i) {
     images[i].image_id = 10 * (i + 1);
-    images[i].descriptors.resize(num_descriptors, kDescriptorDim);
+    images[i].descriptors.resize(num_descriptors, kSiftDescriptorDim);
     for (int row = 0; row < num_descriptors; ++row) images[i].descriptors.row(row) = RandomDescriptor(random);
   }
   return images;
@@ -36,7 +36,7 @@ std::vector<ImageDescriptors> RandomImages(int num_images, int num_descriptors, 
 Result<Vocabulary> Build(const std::vector<ImageDescriptors>& images, const BuildVocabularyOptions& options,
                          int num_threads = 2, uint64_t seed = 7) {
   NoProgress progress;
-  return BuildVocabulary(images, options, seed, num_threads, progress);
+  return BuildVocabulary(images, {}, options, seed, num_threads, progress);
 }
 
 std::string FileBytes(const Vocabulary& vocabulary, const std::string& name) {
@@ -50,9 +50,9 @@ TEST(BuildVocabulary, TakesOverTheWordsOfAnEarlierTree) {
   const auto before = RandomImages(6, 300, 1), after = RandomImages(6, 300, 2);
   const Vocabulary tree = *Build(before, {});
   NoProgress progress;
-  const Vocabulary same = *BuildVocabulary(before, {}, 8, 2, progress, &tree);
+  const Vocabulary same = *BuildVocabulary(before, {}, {}, 8, 2, progress, &tree);
   EXPECT_EQ(FileBytes(same, "same.db"), FileBytes(tree, "tree.db"));
-  const Vocabulary other = *BuildVocabulary(after, {}, 8, 2, progress, &tree);
+  const Vocabulary other = *BuildVocabulary(after, {}, {}, 8, 2, progress, &tree);
   EXPECT_EQ(other.centres, tree.centres);
   EXPECT_EQ(other.num_words(), tree.num_words());
   EXPECT_NE(other.inverted_files, tree.inverted_files);
@@ -73,14 +73,14 @@ TEST(BuildVocabulary, SameBytesForAnyNumberOfThreads) {
 TEST(BuildVocabulary, SplitOfSomeRowsIsThatOfThemAlone) {
   const DescriptorMatrix rows = RandomImages(1, 60, 4)[0].descriptors;
   std::vector<int32_t> odd, all(30);
-  DescriptorMatrix odd_rows(30, kDescriptorDim);
+  DescriptorMatrix odd_rows(30, kSiftDescriptorDim);
   for (int i = 0; i < 30; ++i) {
     odd.push_back(2 * i + 1);
     all[i] = i;
     odd_rows.row(i) = rows.row(2 * i + 1);
   }
-  const std::vector<NodeChild> of_some = SplitNode(rows, odd, 5, 10, 9, 1);
-  const std::vector<NodeChild> alone = SplitNode(odd_rows, all, 5, 10, 9, 1);
+  const std::vector<NodeChild> of_some = SplitNode(rows, {}, odd, 5, 10, 9, 1);
+  const std::vector<NodeChild> alone = SplitNode(odd_rows, {}, all, 5, 10, 9, 1);
   ASSERT_EQ(of_some.size(), alone.size());
   ASSERT_GE(of_some.size(), 2u);
   for (size_t i = 0; i < alone.size(); ++i) {
@@ -176,7 +176,7 @@ TEST(BuildVocabulary, StopListSilencesWordsOfManyImages) {
 
 TEST(BuildVocabulary, ImageWithoutDescriptorsIsADocumentWithoutWords) {
   std::vector<ImageDescriptors> images = RandomImages(3, 50, 8);
-  images[1].descriptors.resize(0, kDescriptorDim);
+  images[1].descriptors.resize(0, kSiftDescriptorDim);
   const Vocabulary vocabulary = *Build(images, {});
   EXPECT_EQ(vocabulary.document_ids.size(), 3u);
   EXPECT_EQ(vocabulary.document_norms[1], 0.f);

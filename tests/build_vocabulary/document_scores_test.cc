@@ -17,7 +17,7 @@ using testing::ElementsAre;
 
 DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(count, kDescriptorDim);
+  DescriptorMatrix descriptors(count, kSiftDescriptorDim);
   for (Eigen::Index i = 0; i < descriptors.size(); ++i)
     descriptors.data()[i] = static_cast<uint8_t>(random.UniformInt(0, 90));
   return descriptors;
@@ -28,7 +28,7 @@ Vocabulary RandomVocabulary(int num_images) {
   for (int i = 0; i < num_images; ++i)
     images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(40 + i, 7 + i)});
   NoProgress progress;
-  return *BuildVocabulary(images, {}, 0, 1, progress);
+  return *BuildVocabulary(images, {}, {}, 0, 1, progress);
 }
 
 TEST(DocumentScores, AreThoseOfTheQuery) {
@@ -55,7 +55,7 @@ TEST(DocumentScores, ADocumentIsItsOwnBestMatch) {
 TEST(DocumentScores, NothingSharedScoresNothing) {
   const Vocabulary vocabulary = RandomVocabulary(3);
   EXPECT_THAT(ScoreDocuments(vocabulary, {}), ElementsAre(0, 0, 0));
-  EXPECT_TRUE(CountWords(vocabulary, DescriptorMatrix(0, kDescriptorDim)).empty());
+  EXPECT_TRUE(CountWords(vocabulary, DescriptorMatrix(0, kSiftDescriptorDim)).empty());
   EXPECT_TRUE(CountWords(Vocabulary(), RandomDescriptors(5, 1)).empty());
 }
 

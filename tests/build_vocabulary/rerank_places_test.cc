@@ -24,14 +24,14 @@ class Room {
  public:
   explicit Room(uint64_t seed) {
     Random random(seed);
-    descriptors_.resize(kNumPoints, kDescriptorDim);
+    descriptors_.resize(kNumPoints, kSiftDescriptorDim);
     for (int i = 0; i < kNumPoints; ++i) {
       points_.emplace_back(random.Uniform(-4, 4), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
-      Eigen::Matrix<double, 1, kDescriptorDim> values;
-      for (int d = 0; d < kDescriptorDim; ++d)
+      Eigen::Matrix<double, 1, kSiftDescriptorDim> values;
+      for (int d = 0; d < kSiftDescriptorDim; ++d)
         values[d] = random.Uniform() < 0.3 ? std::abs(random.Normal(0, 1)) : 0;
       values *= 500 / values.norm();
-      for (int d = 0; d < kDescriptorDim; ++d)
+      for (int d = 0; d < kSiftDescriptorDim; ++d)
         descriptors_(i, d) = static_cast<uint8_t>(std::min(255.0, values[d]));
     }
   }
@@ -50,7 +50,7 @@ class Room {
       features.keypoints.push_back({static_cast<float>(pixel->x() + random.Normal(0, noise_px)),
                                     static_cast<float>(pixel->y() + random.Normal(0, noise_px)), 2, 0});
     }
-    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kSiftDescriptorDim);
     for (size_t row = 0; row < seen.size(); ++row)
       features.descriptors.row(static_cast<Eigen::Index>(row)) = descriptors_.row(seen[row]);
     return features;

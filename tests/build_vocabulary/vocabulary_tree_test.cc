@@ -15,9 +15,9 @@ namespace {
 
 DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(count, kDescriptorDim);
+  DescriptorMatrix descriptors(count, kSiftDescriptorDim);
   for (int row = 0; row < count; ++row) {
-    for (int i = 0; i < kDescriptorDim; ++i)
+    for (int i = 0; i < kSiftDescriptorDim; ++i)
       descriptors(row, i) = static_cast<uint8_t>(random.UniformInt(0, 90));
   }
   return descriptors;
@@ -34,7 +34,7 @@ Vocabulary HandMadeTree() {
   tree.nodes.resize(5);
   tree.nodes[0].num_children = 2;
   tree.nodes[1].num_children = 2;
-  tree.centres = DescriptorMatrix::Zero(5, kDescriptorDim);
+  tree.centres = DescriptorMatrix::Zero(5, kSiftDescriptorDim);
   tree.centres(1, 0) = 200;
   tree.centres(1, 1) = 200;
   tree.centres(2, 2) = 255;
@@ -50,7 +50,7 @@ Vocabulary HandMadeTree() {
 }
 
 DescriptorMatrix Unit(int dimension) {
-  DescriptorMatrix descriptor = DescriptorMatrix::Zero(1, kDescriptorDim);
+  DescriptorMatrix descriptor = DescriptorMatrix::Zero(1, kSiftDescriptorDim);
   descriptor(0, dimension) = 255;
   return descriptor;
 }
@@ -68,7 +68,7 @@ TEST(VocabularyTree, ScoresByHand) {
   // idf: word 0 is in both documents, ln 1 = 0; words 1 and 2 have ln 2.  Documents are (2 ln 2) e1 and (3 ln
   // 2) e2, so a query of one word 1 and one word 2 makes 45 degrees with both.
   const Vocabulary tree = HandMadeTree();
-  DescriptorMatrix query(2, kDescriptorDim);
+  DescriptorMatrix query(2, kSiftDescriptorDim);
   query << Unit(0), Unit(1);
   const auto scored = QueryVocabulary(tree, query, 10);
   ASSERT_EQ(scored.size(), 2u);
@@ -87,7 +87,7 @@ TEST(VocabularyTree, ScoresEqualBruteForceOverDenseVectors) {
   NoProgress progress;
   BuildVocabularyOptions options;
   options.tree.depth = 2;
-  const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
+  const Vocabulary vocabulary = *BuildVocabulary(images, {}, options, 0, 1, progress);
   const int num_words = vocabulary.num_words();
 
   // Oracle: dense, L2-normalised tf-idf vectors; score 1 - |q - d|^2 / 2.
@@ -129,7 +129,7 @@ TEST(VocabularyTree, ImageOfTheSurveyFindsItself) {
   NoProgress progress;
   BuildVocabularyOptions options;
   options.tree.depth = 3;
-  const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
+  const Vocabulary vocabulary = *BuildVocabulary(images, {}, options, 0, 1, progress);
   for (int i = 0; i < 20; ++i) {
     const auto scored = QueryVocabulary(vocabulary, images[i].descriptors, 1);
     ASSERT_EQ(scored.size(), 1u);

@@ -25,8 +25,8 @@ struct Survey {
   Classes classes;
 };
 
-Eigen::Matrix<uint8_t, 1, kDescriptorDim> RandomDescriptor(Random* random) {
-  Eigen::Matrix<double, 1, kDescriptorDim> values;
+Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> RandomDescriptor(Random* random) {
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> values;
   for (double& value : values) value = random->Uniform();
   return (512 * values / values.norm()).cast<uint8_t>();
 }

@@ -211,7 +211,7 @@ TEST(EmitMap, KeptDocumentsAloneHavePostings) {
 }
 
 TEST(QuantizeDescriptorValues, FewValuesStayAsTheyAre) {
-  DescriptorMatrix descriptors = DescriptorMatrix::Zero(2, kDescriptorDim);
+  DescriptorMatrix descriptors = DescriptorMatrix::Zero(2, kSiftDescriptorDim);
   descriptors.row(1).setConstant(77);
   descriptors(0, 5) = 200;
   const DescriptorMatrix before = descriptors;
@@ -221,7 +221,7 @@ TEST(QuantizeDescriptorValues, FewValuesStayAsTheyAre) {
 
 TEST(QuantizeDescriptorValues, LevelsAreTheMeansOfTheirValues) {
   // 10, 12 and 200, 202, equally often: two levels, 11 and 201.
-  DescriptorMatrix descriptors(4, kDescriptorDim);
+  DescriptorMatrix descriptors(4, kSiftDescriptorDim);
   for (int row = 0; row < 4; ++row) {
     descriptors.row(row).setConstant(static_cast<uint8_t>((row < 2 ? 10 : 200) + 2 * (row % 2)));
   }

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_distance.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
 #include "tests/core/promise/wall_survey.h"
@@ -175,9 +176,9 @@ TEST(LeaveOutImages, ClassesAreDescribedByTheImagesThatAreLeft) {
   std::vector<Features> features(kNumImages);
   for (int image = 0; image < kNumImages; ++image) {
     features[image].keypoints.resize(kNumClasses);
-    features[image].descriptors.resize(kNumClasses, kDescriptorDim);
+    features[image].descriptors.resize(kNumClasses, kSiftDescriptorDim);
     for (int i = 0; i < kNumClasses; ++i) {
-      for (int k = 0; k < kDescriptorDim; ++k)
+      for (int k = 0; k < kSiftDescriptorDim; ++k)
         features[image].descriptors(i, k) = static_cast<uint8_t>((7 * i + 13 * k * (image + 1)) % 251 / 4);
     }
     classes.images.push_back({.image_id = static_cast<ImageId>(image + 1), .name = {}, .camera_id = 1});
@@ -201,9 +202,9 @@ TEST(LeaveOutImages, ClassesAreDescribedByTheImagesThatAreLeft) {
   ASSERT_EQ(survey->classes.classes.size(), static_cast<size_t>(kNumClasses));
   EXPECT_EQ(survey->classes.classes[0].descriptor, classes.classes[0].descriptor) << "as it was";
   for (int i = 1; i < kNumClasses; ++i) {
-    const DescriptorSum sum =
+    const Eigen::Matrix<double, 1, Eigen::Dynamic> sum =
         features[0].descriptors.row(i).cast<double>() + features[1].descriptors.row(i).cast<double>();
-    ASSERT_EQ(survey->classes.classes[i].descriptor, MeanDescriptor(sum)) << i;
+    ASSERT_EQ(survey->classes.classes[i].descriptor, MeanDescriptor(sum, 0)) << i;
   }
 }
 

@@ -40,7 +40,7 @@ Classes WallClasses() {
     FeatureClass feature_class{.class_id = static_cast<ClassId>(100 + i),
                                .position = {0.1 * static_cast<double>(i) - 1, 0.3, 2},
                                .covariance = Eigen::Matrix3d::Identity() * 1e-6};
-    for (int value = 0; value < kDescriptorDim; ++value)
+    for (int value = 0; value < kSiftDescriptorDim; ++value)
       feature_class.descriptor[value] =
           static_cast<uint8_t>(std::min(200.0, 40 * std::abs(random.Normal(0, 1))));
     for (const SurveyImage& image : classes.images) {
@@ -60,7 +60,7 @@ MapRows RowsOf(const Classes& classes, size_t first = 0) {
   rows.cameras = classes.cameras;
   rows.sessions = classes.sessions;
   const size_t num = classes.classes.size() - first;
-  rows.descriptors.resize(static_cast<Eigen::Index>(num), kDescriptorDim);
+  rows.descriptors.resize(static_cast<Eigen::Index>(num), kSiftDescriptorDim);
   for (size_t i = 0; i < num; ++i) {
     const FeatureClass& feature_class = classes.classes[first + i];
     rows.landmarks.push_back(

@@ -47,6 +47,7 @@ const std::map<std::string, std::vector<std::string>> kGiven = {
     {"simulate.pose_noise_deg", {"0.5"}},
     {"simulate.num_queries", {"3", "0"}},
     {"extract_features.masks", {"\"../masks\""}},
+    {"extract_features.model", {"\"none.onnx\""}},  // a real one: EndToEnd.OtherFeatures
     {"reconstruct.control_points", {"\"../control_points.txt\""}},
     {"reconstruct.distances", {"\"../distances.txt\""}},
     {"reconstruct.rig_baselines", {"\"../rig.txt\""}},

@@ -30,11 +30,11 @@ const Features& SomeFeatures() {
   static const Features features = [] {
     Random random(1);
     Features some;
-    some.descriptors.resize(100, kDescriptorDim);
+    some.descriptors.resize(100, kSiftDescriptorDim);
     for (int i = 0; i < 100; ++i) {
       some.keypoints.push_back({static_cast<float>(random.Uniform(0, kImageSide)),
                                 static_cast<float>(random.Uniform(0, kImageSide)), 2, 0});
-      for (int k = 0; k < kDescriptorDim; ++k) {
+      for (int k = 0; k < kSiftDescriptorDim; ++k) {
         some.descriptors(i, k) = static_cast<uint8_t>(random.UniformInt(0, 60));
       }
     }

@@ -28,33 +28,34 @@ ClassAppearance Look(double angle, double radius, double x, int num_observations
 TEST(FindAmbiguous, LookAlikesApartAreBothDropped) {
   //   angle   0.1   0.2         1.0
   //   place   0 m   5 m         9 m      radius 0.15: the first two cannot be told apart
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 5), Look(0.2, 0.15, 5, 5), Look(1.0, 0.15, 9, 5)}, {}),
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 5), Look(0.2, 0.15, 5, 5), Look(1.0, 0.15, 9, 5)}, {}, {}),
               ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous, Ambiguity::kNone));
 }
 
 TEST(FindAmbiguous, LookAlikesAtOnePlaceAreDuplicatesAndTheLargerStays) {
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 3), Look(0.2, 0.15, 0.01, 8)}, {}),
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 3), Look(0.2, 0.15, 0.01, 8)}, {}, {}),
               ElementsAre(Ambiguity::kDuplicate, Ambiguity::kNone));
 }
 
 TEST(FindAmbiguous, RuleCanBeSwitchedOff) {
   FindAmbiguousOptions options;
   options.min_separation_ratio = 0;
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 5), Look(0.2, 0.15, 5, 5)}, options),
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.15, 0, 5), Look(0.2, 0.15, 5, 5)}, {}, options),
               ElementsAre(Ambiguity::kNone, Ambiguity::kNone));
 }
 
 TEST(FindAmbiguous, FewClassesAreNeverAmbiguous) {
-  EXPECT_TRUE(FindAmbiguous({}, {}).empty());
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.5, 0, 5)}, {}), ElementsAre(Ambiguity::kNone));
+  EXPECT_TRUE(FindAmbiguous({}, {}, {}).empty());
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.5, 0, 5)}, {}, {}), ElementsAre(Ambiguity::kNone));
 }
 
 TEST(FindAmbiguous, NearestLookAlikeMayBeTheDuplicateOfAnAmbiguousClass) {
   //   angle   0.10    0.13     0.22      radius 0.15: all three look alike
   //   place   0 m     0.01 m   5 m       0 and 1 are nearest to each other, and one scene feature;
   //                                      2 is nearest to 1, but cannot be told from 0 either
-  EXPECT_THAT(FindAmbiguous({Look(0.10, 0.15, 0, 8), Look(0.13, 0.15, 0.01, 5), Look(0.22, 0.15, 5, 5)}, {}),
-              ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous, Ambiguity::kAmbiguous));
+  EXPECT_THAT(
+      FindAmbiguous({Look(0.10, 0.15, 0, 8), Look(0.13, 0.15, 0.01, 5), Look(0.22, 0.15, 5, 5)}, {}, {}),
+      ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous, Ambiguity::kAmbiguous));
 }
 
 TEST(FindAmbiguous, AWideClassTakesAllWithinItsRadius) {
@@ -65,9 +66,9 @@ TEST(FindAmbiguous, AWideClassTakesAllWithinItsRadius) {
                                                 Look(0.75, 0.01, 6, 5), Look(0.9, 0.01, 9, 5)};
   const std::vector<Ambiguity> expected = {Ambiguity::kAmbiguous, Ambiguity::kAmbiguous,
                                            Ambiguity::kAmbiguous, Ambiguity::kNone};
-  EXPECT_EQ(FindAmbiguous(classes, {}), expected);
+  EXPECT_EQ(FindAmbiguous(classes, {}, {}), expected);
   // The same from the other end: whose radius it is does not depend on the order.
-  EXPECT_EQ(FindAmbiguous({classes.rbegin(), classes.rend()}, {}),
+  EXPECT_EQ(FindAmbiguous({classes.rbegin(), classes.rend()}, {}, {}),
             (std::vector<Ambiguity>{expected.rbegin(), expected.rend()}));
 }
 
@@ -76,7 +77,7 @@ TEST(FindAmbiguous, OfManyDuplicatesTheOneOfMostKeypointsStays) {
   EXPECT_THAT(
       FindAmbiguous({Look(0.10, 0.2, 0, 4), Look(0.12, 0.2, 0.01, 9), Look(0.14, 0.2, 0.02, 9),
                      Look(0.16, 0.2, 0.03, 2)},
-                    {}),
+                    {}, {}),
       ElementsAre(Ambiguity::kDuplicate, Ambiguity::kNone, Ambiguity::kDuplicate, Ambiguity::kDuplicate));
 }
 
@@ -104,8 +105,8 @@ std::vector<Ambiguity> Judged(const std::vector<ClassAppearance>& classes,
 
 ClassAppearance RandomLook(Random& random) {
   ClassAppearance look;
-  Eigen::Matrix<double, 1, kDescriptorDim> d;
-  for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 3);
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> d;
+  for (int k = 0; k < kSiftDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 3);
   look.centre = (d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>();
   look.position = Eigen::Vector3d(random.Uniform(0, 1), 0, 0);
   look.num_observations = static_cast<int>(random.UniformInt(2, 5));
@@ -124,11 +125,11 @@ TEST(FindAmbiguous, EveryPairIsJudgedWhateverTheRadii) {
       }
       FindAmbiguousOptions options;
       options.max_duplicate_distance_m = 0.3;
-      const std::vector<Ambiguity> found = FindAmbiguous(classes, options);
+      const std::vector<Ambiguity> found = FindAmbiguous(classes, {}, options);
       EXPECT_EQ(found, Judged(classes, options)) << widest << " " << seed;
       // By the ratio, too.
       options.min_separation_ratio = 0.9;
-      EXPECT_EQ(FindAmbiguous(classes, options), Judged(classes, options)) << widest << " " << seed;
+      EXPECT_EQ(FindAmbiguous(classes, {}, options), Judged(classes, options)) << widest << " " << seed;
     }
   }
 }
@@ -141,7 +142,7 @@ TEST(FindAmbiguous, RepeatedTexturesAreJudgedPairByPair) {
     const ClassAppearance look = RandomLook(random);
     for (int i = 0; i < 20; ++i) {
       classes.push_back(look);
-      for (int k = 0; k < kDescriptorDim; ++k)
+      for (int k = 0; k < kSiftDescriptorDim; ++k)
         classes.back().centre[k] =
             static_cast<uint8_t>(std::clamp<int64_t>(look.centre[k] + random.UniformInt(-1, 1), 0, 255));
       classes.back().radius_rad = random.Uniform(0.005, 0.03);
@@ -149,7 +150,7 @@ TEST(FindAmbiguous, RepeatedTexturesAreJudgedPairByPair) {
       classes.back().num_observations = static_cast<int>(random.UniformInt(2, 5));
     }
   }
-  const std::vector<Ambiguity> found = FindAmbiguous(classes, {});
+  const std::vector<Ambiguity> found = FindAmbiguous(classes, {}, {});
   EXPECT_EQ(found, Judged(classes, {}));
   for (const Ambiguity value : {Ambiguity::kNone, Ambiguity::kAmbiguous, Ambiguity::kDuplicate})
     EXPECT_GT(std::count(found.begin(), found.end(), value), 40);
@@ -158,17 +159,17 @@ TEST(FindAmbiguous, RepeatedTexturesAreJudgedPairByPair) {
 TEST(FindAmbiguous, EqualLooksAreToldApartWhereTheRuleIsOff) {
   FindAmbiguousOptions options;
   options.min_separation_ratio = 0;
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.1, 0, 5), Look(0.1, 0.1, 5, 5)}, options),
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0.1, 0, 5), Look(0.1, 0.1, 5, 5)}, {}, options),
               ElementsAre(Ambiguity::kNone, Ambiguity::kNone));
   // Without a radius only equal looks are one.
-  EXPECT_THAT(FindAmbiguous({Look(0.1, 0, 0, 5), Look(0.1, 0, 5, 5), Look(0.15, 0, 9, 5)}, {}),
+  EXPECT_THAT(FindAmbiguous({Look(0.1, 0, 0, 5), Look(0.1, 0, 5, 5), Look(0.15, 0, 9, 5)}, {}, {}),
               ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous, Ambiguity::kNone));
 }
 
 TEST(DescribeClass, RadiusOfEqualDescriptorsIsZero) {
   const ClassAppearance look = Look(0.3, 0, 0, 1);
   ClassAppearance described;
-  DescribeClass({look.centre.data(), look.centre.data()}, &described);
+  DescribeClass({look.centre.data(), look.centre.data()}, {}, &described);
   EXPECT_NEAR(described.radius_rad, 0, 0.08);  // quantisation: acos near 1 is steep
 }
 

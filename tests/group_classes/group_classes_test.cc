@@ -53,11 +53,11 @@ Survey MakeSurvey(const SurveyNoise& noise) {
   }
   Random random(11), drift_random(12);
   Pose drift;  // world_from_drifted world
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> looks;
+  std::vector<Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>> looks;
   for (int p = 0; p < kPoints; ++p) {
     survey.points.emplace_back(random.Uniform(-3, 3), random.Uniform(-1.2, 1.2), random.Uniform(2, 4));
-    Eigen::Matrix<double, 1, kDescriptorDim> d;
-    for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 6);
+    Eigen::Matrix<double, 1, kSiftDescriptorDim> d;
+    for (int k = 0; k < kSiftDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 6);
     looks.push_back((d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>());
   }
   std::vector<std::map<int, uint32_t>>& keypoint_of_point = survey.keypoint_of_point;
@@ -102,7 +102,7 @@ Survey MakeSurvey(const SurveyNoise& noise) {
                                     static_cast<float>(pixel->y() + random.Normal(0, noise.pixel)), 2, 0});
       seen.push_back(p);
     }
-    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kSiftDescriptorDim);
     for (size_t k = 0; k < seen.size(); ++k)
       features.descriptors.row(static_cast<Eigen::Index>(k)) = looks[seen[k]];
     survey.matched.features.push_back(std::move(features));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/features/descriptor_distance.h"
 
 namespace cairn::group_classes {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 // Classes of two changes of one session, seen from 3 m: what vanished at one and what appeared at the other.
 class MovedThings : public testing::Test {
  protected:
-  int Add(const Eigen::Vector3d& position, const Eigen::Matrix<uint8_t, 1, kDescriptorDim>& descriptor) {
+  int Add(const Eigen::Vector3d& position, const Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>& descriptor) {
     FeatureClass row;
     row.position = position;
     row.descriptor = descriptor;
@@ -18,10 +19,10 @@ class MovedThings : public testing::Test {
     return static_cast<int>(classes_.classes.size()) - 1;
   }
 
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> RandomDescriptor() {
-    DescriptorSum sum;
-    for (int i = 0; i < kDescriptorDim; ++i) sum[i] = random_.Uniform() < 0.3 ? random_.Uniform() : 0.01;
-    return MeanDescriptor(sum);
+  Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> RandomDescriptor() {
+    Eigen::Matrix<double, 1, Eigen::Dynamic> sum(kSiftDescriptorDim);
+    for (int i = 0; i < kSiftDescriptorDim; ++i) sum[i] = random_.Uniform() < 0.3 ? random_.Uniform() : 0.01;
+    return MeanDescriptor(sum, 0);
   }
 
   // A thing of `num` classes within a square metre: it vanishes at change `from`, and the first `num_again`

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include "core/blocks/map_rows.h"
 #include "core/delta/map_delta.h"
+#include "core/features/sift.h"
 #include "core/files/file.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/localizer.h"
@@ -64,6 +66,52 @@ TEST_F(CApi, GivesThePoseOfTheCxxApiBitForBit) {
   EXPECT_EQ(Matrix6d(fix.covariance), expected->covariance.transpose());  // rows here, columns in Eigen
   EXPECT_EQ(fix.num_inliers, expected->num_inliers);
   EXPECT_EQ(fix.region, expected->region);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+}
+
+// The image's own features give the image's fix; of a map of bits, bits do.
+TEST_F(CApi, FeaturesGiveTheFixOfTheirImage) {
+  cairn_localizer* localizer = NewLocalizer();
+  const cairn_image image = Picture();
+  cairn_fix expected = CAIRN_FIX_INIT, fix = CAIRN_FIX_INIT;
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &expected), CAIRN_OK);
+  cairn_camera camera = CAIRN_CAMERA_INIT;
+  ASSERT_EQ(cairn_map_camera_for_size(map_, 320, 240, &camera), CAIRN_OK);
+  const Features features = *ExtractSift(picture_, {});
+  const auto num = static_cast<int32_t>(features.keypoints.size());
+  const float* keypoints = &features.keypoints.front().x;
+  const auto localize = [&](int32_t is_float, int32_t num_columns, int32_t num_features) {
+    return cairn_localize_features(localizer, keypoints, features.descriptors.data(), is_float, num_columns,
+                                   num_features, &camera, nullptr, &fix);
+  };
+  ASSERT_EQ(localize(0, 128, num), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(fix.has_fix, 1);
+  EXPECT_EQ(Eigen::Vector3d(fix.center_m), Eigen::Vector3d(expected.center_m));
+  EXPECT_EQ(fix.num_inliers, expected.num_inliers);
+  char kind[64];
+  EXPECT_EQ(cairn_map_descriptors(map_, kind, sizeof(kind)), CAIRN_OK);
+  EXPECT_STREQ(kind, "sift");
+  EXPECT_EQ(cairn_map_descriptors(map_, kind, 3), CAIRN_OK);
+  EXPECT_STREQ(kind, "si");
+
+  EXPECT_EQ(localize(0, 128, 0), CAIRN_OK);
+  EXPECT_EQ(fix.has_fix, 0);
+  EXPECT_EQ(localize(0, 64, num), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("descriptors of 64 bytes, expected 128 of the kind 'sift'"));
+  EXPECT_EQ(localize(1, 32, num), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("floating-point values, expected bytes"));
+  EXPECT_EQ(localize(0, 128, -1), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_localize_features(localizer, nullptr, features.descriptors.data(), 0, 128, num, &camera,
+                                    nullptr, &fix),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_localize_features(localizer, keypoints, features.descriptors.data(), 0, 128, num, nullptr,
+                                    nullptr, &fix),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_map_descriptors(map_, nullptr, 8), CAIRN_INVALID_ARGUMENT);
+  const float bad[4] = {1, 2, std::numeric_limits<float>::quiet_NaN(), 0};
+  EXPECT_EQ(
+      cairn_localize_features(localizer, bad, features.descriptors.data(), 0, 128, 1, &camera, nullptr, &fix),
+      CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
 }
 

@@ -35,7 +35,7 @@ class PosterRoom {
       if (i > 0) rows_.appearance[i - 1].links.push_back({i, 40});
     }
     NoProgress progress;
-    rows_.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, 0, 1, progress);
+    rows_.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, {}, 0, 1, progress);
   }
 
   const MapRows& rows() const { return rows_; }
@@ -81,7 +81,7 @@ class PosterRoom {
            .num_observations = 1});
     }
     const Eigen::Index before = rows_.descriptors.rows();
-    rows_.descriptors.conservativeResize(before + features.descriptors.rows(), kDescriptorDim);
+    rows_.descriptors.conservativeResize(before + features.descriptors.rows(), kSiftDescriptorDim);
     rows_.descriptors.bottomRows(features.descriptors.rows()) = features.descriptors;
     rows_.images.push_back(std::move(image));
     return rows_.images.back();

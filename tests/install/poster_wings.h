@@ -28,7 +28,7 @@ class PosterWings {
                                                              {"h0", 6}, {"h1", 7}, {"h2", 8}};
     for (const auto& [name, poster] : places) AddPlace(name, poster);
     NoProgress progress;
-    rows_.vocabulary = *build_vocabulary::BuildVocabulary(documents_, {}, 0, 1, progress);
+    rows_.vocabulary = *build_vocabulary::BuildVocabulary(documents_, {}, {}, 0, 1, progress);
     for (const int wing : {0, 4}) {
       for (int i = 0; i < 3; ++i) Link(wing + i, wing + i + 1, 40);
       Link(wing + 3, 8, 40);
@@ -65,7 +65,7 @@ class PosterWings {
            .covariance = 1e-6 * Eigen::Matrix3d::Identity(),
            .num_observations = 1});
     }
-    rows_.descriptors.conservativeResize(first + features.descriptors.rows(), kDescriptorDim);
+    rows_.descriptors.conservativeResize(first + features.descriptors.rows(), kSiftDescriptorDim);
     rows_.descriptors.bottomRows(features.descriptors.rows()) = features.descriptors;
     documents_.push_back({image.image_id, features.descriptors});
     rows_.appearance.push_back({.images = {static_cast<int32_t>(rows_.images.size())}, .is_kept = true});

@@ -418,6 +418,27 @@ class Localizing(Poster):
         self.assertEqual(fix.candidates, expected["candidates"])
         self.assertEqual(fix.scope, expected["scope"])
 
+    def test_features_give_the_fix_of_their_image(self):
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copy(POSTER / "poster.pgm", folder)
+            subprocess.run([PROGRAM, "stage", "extract-features", folder, "-o", f"{folder}/f.db"], capture_output=True, check=True)
+            database = sqlite3.connect(f"{folder}/f.db")
+            (keypoints,), (descriptors,) = (database.execute(f"SELECT data FROM {table}").fetchone() for table in ("keypoints", "descriptors"))
+            database.close()
+        keypoints = numpy.frombuffer(keypoints, numpy.float32).reshape(-1, 4)
+        descriptors = numpy.frombuffer(descriptors, numpy.uint8).reshape(-1, 128)
+        camera = self.map.camera_for_size(320, 240)
+        self.assertEqual(self.map.descriptors, "sift")
+        fix = self.localizer.localize_features(keypoints, descriptors, camera)
+        self.assertEqual(fix.center.tolist(), self.localizer.localize(self.image).center.tolist())
+        self.assertTrue(self.localizer.localize_features(keypoints[:, :2].astype(float), descriptors[:, :], camera))
+        self.assertFalse(self.localizer.localize_features(keypoints[:0], descriptors[:0], camera))
+        for wrong in ((keypoints, descriptors[:, :64]), (keypoints, descriptors.astype(numpy.float32)), (keypoints[:5], descriptors),
+                      (keypoints[:, :1], descriptors), (keypoints.ravel(), descriptors), (keypoints.astype(int), descriptors),
+                      (keypoints * numpy.nan, descriptors), (keypoints, descriptors.astype(int))):
+            with self.assertRaises((TypeError, ValueError, cairn.Error)):
+                self.localizer.localize_features(*wrong, camera)
+
     def test_pose_is_where_the_picture_was_taken(self):
         fix = self.localizer.localize(self.image)
         numpy.testing.assert_allclose(fix.center, [0.4, 0.1, 1.6], atol=0.05)

@@ -68,7 +68,7 @@ class TwoDoors : public testing::Test {
       for (size_t i = 0; i < images_.images.size(); ++i) {
         WriteDatabaseImage(database, images_.images[i]);
         Features features{.keypoints = keypoints_[i], .descriptors = {}};
-        features.descriptors.setZero(static_cast<Eigen::Index>(keypoints_[i].size()), kDescriptorDim);
+        features.descriptors.setZero(static_cast<Eigen::Index>(keypoints_[i].size()), kSiftDescriptorDim);
         WriteDatabaseFeatures(database, images_.images[i].image_id, features);
       }
       for (const AppearanceLink& link : images_.links) {

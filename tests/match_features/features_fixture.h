@@ -32,11 +32,11 @@ class MatchFeaturesTest : public testing::Test {
     camera.params = {500, 500, 320, 240};
     Random random(3);
     std::vector<Eigen::Vector3d> points;
-    DescriptorMatrix descriptors(80, kDescriptorDim);
+    DescriptorMatrix descriptors(80, kSiftDescriptorDim);
     for (int i = 0; i < 80; ++i) {
       points.emplace_back(random.Uniform(-0.8, 0.8), random.Uniform(-0.6, 0.6), random.Uniform(2, 4));
-      Eigen::Matrix<double, 1, kDescriptorDim> d;
-      for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 4);
+      Eigen::Matrix<double, 1, kSiftDescriptorDim> d;
+      for (int k = 0; k < kSiftDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 4);
       descriptors.row(i) = (d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>();
     }
     const Status status =

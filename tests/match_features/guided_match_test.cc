@@ -17,8 +17,8 @@ constexpr double kMaxError = 2.0 / 500;
 // A scene whose points look alike in groups of three: blind matching fails the ratio test on all of them.
 TwoViewScene RepeatedStructure(int num_points) {
   TwoViewScene scene = MakeTwoViewScene({.num_points = num_points});
-  scene.descriptors1.resize(num_points, kDescriptorDim);
-  scene.descriptors2.resize(num_points, kDescriptorDim);
+  scene.descriptors1.resize(num_points, kSiftDescriptorDim);
+  scene.descriptors2.resize(num_points, kSiftDescriptorDim);
   for (int i = 0; i < num_points; ++i) {
     FillDescriptor(i / 3, &scene.descriptors1, i);
     FillDescriptor(i / 3, &scene.descriptors2, i);

@@ -164,7 +164,7 @@ TEST_F(MatchFeaturesTest, RetrievalMatchesImagesThatShowTheSameWords) {
   // Images 1 and 2 show one place, 3 and 4 another.
   const auto other_place = [](SQLite::Database& database) {
     Random random(11);
-    std::string bytes(80 * kDescriptorDim, '\0');
+    std::string bytes(80 * kSiftDescriptorDim, '\0');
     for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
     SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 2");
     update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
@@ -209,7 +209,7 @@ TEST_F(MatchFeaturesTest, VocabularyWithoutWordsIsAnError) {
   Vocabulary vocabulary;
   vocabulary.nodes.resize(1);
   ASSERT_TRUE(NumberVocabularyNodes(&vocabulary).ok());
-  vocabulary.centres.setZero(1, kDescriptorDim);
+  vocabulary.centres.setZero(1, kSiftDescriptorDim);
   ASSERT_TRUE(WriteVocabulary(vocabulary, folder_ + "/vocabulary.db").ok());
   options_.pairs = "retrieval";
   inputs_.vocabulary_path = folder_ + "/vocabulary.db";

@@ -35,7 +35,7 @@ class MatchFeaturesReuse : public MatchFeaturesTest {
   // Images 5 to 8 show another place, so that words tell images apart.
   void MoveLastImages() {
     Random random(11);
-    std::string bytes(80 * kDescriptorDim, '\0');
+    std::string bytes(80 * kSiftDescriptorDim, '\0');
     for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
     SQLite::Database database(folder_ + "/features.db", SQLite::OPEN_READWRITE);
     SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 4");

@@ -20,10 +20,10 @@ struct TwoViewScene {
   std::vector<Match> matches;
 
   ViewForVerification View1(const std::optional<Pose>& stated) const {
-    return {&camera, &keypoints1, &bearings1, nullptr, stated};
+    return {&camera, &keypoints1, &bearings1, nullptr, {}, stated};
   }
   ViewForVerification View2(const std::optional<Pose>& stated) const {
-    return {&camera, &keypoints2, &bearings2, nullptr, stated};
+    return {&camera, &keypoints2, &bearings2, nullptr, {}, stated};
   }
 };
 
@@ -81,11 +81,11 @@ inline TwoViewScene MakeTwoViewScene(const TwoViewSceneOptions& options) {
 // A descriptor of norm near 512, as RootSIFT's are, that no other seed comes near.
 inline void FillDescriptor(uint64_t seed, DescriptorMatrix* descriptors, int row) {
   Random random(MixSeed(99, seed));
-  Eigen::Matrix<double, 1, kDescriptorDim> values;
-  for (int d = 0; d < kDescriptorDim; ++d)
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> values;
+  for (int d = 0; d < kSiftDescriptorDim; ++d)
     values[d] = std::abs(random.Normal(0, 1)) * (random.Uniform() < 0.3);
   values *= 500 / values.norm();
-  for (int d = 0; d < kDescriptorDim; ++d)
+  for (int d = 0; d < kSiftDescriptorDim; ++d)
     (*descriptors)(row, d) = static_cast<uint8_t>(std::min(255.0, values[d]));
 }
 

@@ -55,7 +55,7 @@ void WriteScenes(const std::string& path) {
     for (const Case& c : kCases) {
       const TwoViewScene scene = SceneOf(c);
       Features features;
-      features.descriptors.resize(static_cast<Eigen::Index>(scene.matches.size()), kDescriptorDim);
+      features.descriptors.resize(static_cast<Eigen::Index>(scene.matches.size()), kSiftDescriptorDim);
       for (int i = 0; i < features.descriptors.rows(); ++i)
         FillDescriptor(1000 * image_id + i, &features.descriptors, i);
       for (const auto* keypoints : {&scene.keypoints1, &scene.keypoints2}) {

@@ -31,13 +31,13 @@ MapRows Head(const std::string& name) {
   rows.name = name;
   rows.writer = "cairn test";
   rows.cameras = {SomeCamera()};
-  rows.descriptors.resize(0, kDescriptorDim);
+  rows.descriptors.resize(0, kSiftDescriptorDim);
   return rows;
 }
 
 MapRows Named(const std::string& name) {
   MapRows rows = Head(name);
-  rows.descriptors = DescriptorMatrix::Constant(1, kDescriptorDim, 7);
+  rows.descriptors = DescriptorMatrix::Constant(1, kSiftDescriptorDim, 7);
   rows.landmarks = {{.class_id = 1, .position = {1, 2, 0}, .num_observations = 1}};
   rows.stations = {{.position = {0, 0}, .heading_deg = 90}};
   rows.images = {{.image_id = 1, .name = name, .camera_id = 1, .station = 0, .landmarks = {0}}};
@@ -53,7 +53,7 @@ MapRows Lattice(int num_landmarks, int num_stations, int num_regions) {
     return Eigen::Vector2d(0.5 * (station / 4 % side), 0.5 * (station / 4 / side));
   };
   rows.k = 40;
-  rows.descriptors = DescriptorMatrix::Constant(num_landmarks, kDescriptorDim, 40);
+  rows.descriptors = DescriptorMatrix::Constant(num_landmarks, kSiftDescriptorDim, 40);
   for (int i = 0; i < num_landmarks; ++i) {
     rows.landmarks.push_back(
         {.class_id = static_cast<ClassId>(i),

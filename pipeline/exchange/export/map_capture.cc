@@ -13,6 +13,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_kind_table.h"
 #include "core/files/file.h"
 #include "core/files/folder.h"
 #include "core/options/toml_options.h"
@@ -71,7 +72,8 @@ std::vector<LandmarkImage> LandmarkImages(const MapRows& rows) {
       landmarks.push_back(landmark);
     }
     if (landmarks.empty()) continue;
-    added.features.descriptors.resize(static_cast<Eigen::Index>(landmarks.size()), kDescriptorDim);
+    added.features.descriptors.resize(static_cast<Eigen::Index>(landmarks.size()), rows.descriptors.cols());
+    added.features.kind = rows.descriptor_kind;
     for (size_t i = 0; i < landmarks.size(); ++i)
       added.features.descriptors.row(static_cast<Eigen::Index>(i)) =
           rows.descriptors.row(static_cast<Eigen::Index>(landmarks[i]));
@@ -114,6 +116,7 @@ Status WriteCaptureOf(const std::vector<const LandmarkImage*>& images, const std
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kCaptureFrameFile, CaptureFrameJson(rows.frame)));
   return WriteDatabase(folder + "/" + kFeaturesFile, std::string(kColmapSchema) + kLandmarkFeaturesSchema,
                        [&](SQLite::Database& database) -> Status {
+                         WriteDescriptorKind(database, rows.descriptor_kind);
                          for (const auto& [id, camera] : cameras) WriteDatabaseCamera(database, camera);
                          SQLite::Statement row(database, "INSERT INTO cairn_landmark_images VALUES (?)");
                          for (size_t i = 0; i < images.size(); ++i) {

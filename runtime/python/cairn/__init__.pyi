@@ -57,6 +57,9 @@ class Map:
     @property
     def name(self) -> str: ...
     @property
+    def descriptors(self) -> str:
+        """What the landmarks' descriptors are: "sift", "binary 256 orb", "dense 64 xfeat-0a1b2c3d"."""
+    @property
     def epoch(self) -> int:
         """Counts the signed releases of a map of this name; 0: never counted."""
     @property
@@ -515,6 +518,16 @@ class Localizer:
 
         `camera` None: the survey's camera of the image's size.  `up`: no pose tilts the camera, and where it is known well, two
         landmarks make one, not three.  Releases the interpreter's lock meanwhile.
+        """
+    def localize_features(
+        self, keypoints: NDArray[np.floating], descriptors: NDArray[np.floating] | NDArray[np.uint8], camera: Camera,
+        prior: Prior | None = None, up: Up | None = None
+    ) -> Fix:
+        """From features that another program found, as those of the map's survey (Map.descriptors).
+
+        `keypoints`: (n, 2 to 4): x, y, scale, orientation; the first pixel's centre is (0.5, 0.5), so add 0.5 to OpenCV's.
+        `descriptors`: (n, m), of a float or dense kind its values, of any length; of SIFT 128 bytes, of a binary kind its bits,
+        eight in a byte.  Raises a TypeError or ValueError for others.  Nothing of it is logged.
         """
     def localize_rig(self, images: Sequence[RigImage], prior: Prior | None = None, up: Up | None = None) -> Fix:
         """One fix of what the cameras of a rig see at the same time: fix, prior and up are the rig's.  Nothing of it is logged."""

@@ -11,6 +11,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/colmap_database.h"
 #include "core/colmap/landmark_images.h"
+#include "core/features/descriptor_distance.h"
 #include "core/promise/later_views.h"
 #include "core/promise/view_distance.h"
 #include "runtime/localize/localizer.h"
@@ -22,10 +23,10 @@ constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 constexpr int kPlentyOfInliers = 50;
 constexpr size_t kMinNumObservations = 2;
 
-Result<Features> ReadFeatures(SQLite::Database& database, ImageId image_id) {
-  Features features;
+Result<Features> ReadFeatures(SQLite::Database& database, ImageId image_id, const DescriptorKind& kind) {
+  Features features{.keypoints = {}, .descriptors = {}, .kind = kind};
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image_id));
-  CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image_id));
+  CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image_id, kind));
   return features;
 }
 
@@ -46,13 +47,15 @@ Status DescribeTogether(SQLite::Database& database, std::span<const size_t> affe
   }
   std::stable_sort(seen.begin(), seen.end(),
                    [](const Seen& a, const Seen& b) { return a.image_id < b.image_id; });
-  using Sum = Eigen::Matrix<uint32_t, 1, kDescriptorDim>;  // exact
-  std::vector<Sum> sums(affected.size(), Sum::Zero());
+  using Sum = Eigen::Matrix<uint32_t, 1, Eigen::Dynamic>;  // exact
+  const DescriptorKind& kind = classes->descriptor_kind;
+  std::vector<Sum> sums(affected.size(), Sum::Zero(kind.num_values));
+  std::vector<int64_t> counts(affected.size(), 0);
   DescriptorMatrix descriptors;
   for (size_t i = 0; i < seen.size(); ++i) {
     const auto& [image_id, keypoint, described] = seen[i];
     if (i == 0 || image_id != seen[i - 1].image_id) {
-      CAIRN_ASSIGN_OR_RETURN(descriptors, ReadDatabaseDescriptors(database, image_id));
+      CAIRN_ASSIGN_OR_RETURN(descriptors, ReadDatabaseDescriptors(database, image_id, kind));
     }
     if (keypoint >= descriptors.rows()) {
       return MakeError(
@@ -62,9 +65,11 @@ Status DescribeTogether(SQLite::Database& database, std::span<const size_t> affe
           classes->classes[affected[described]].class_id, keypoint, image_id, descriptors.rows());
     }
     sums[described] += descriptors.row(keypoint).cast<uint32_t>();
+    ++counts[described];
   }
   for (size_t k = 0; k < affected.size(); ++k)
-    classes->classes[affected[k]].descriptor = MeanDescriptor(sums[k].cast<double>());
+    classes->classes[affected[k]].descriptor =
+        MeanDescriptor(sums[k].cast<double>(), counts[k], kind.space());
   return Ok();
 }
 
@@ -215,7 +220,7 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
                      .cam_from_world = image.cam_from_world,
                      .features = {},
                      .session = SessionOfImage(classes.sessions, image.name)};
-      CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id));
+      CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id, classes.descriptor_kind));
       survey.images.push_back(std::move(row));
     }
     std::erase_if(survey.classes.images,

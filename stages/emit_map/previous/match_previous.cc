@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/quantiles.h"
+#include "core/features/features.h"
 #include "core/features/transform_code.h"
 
 namespace cairn::emit_map {
@@ -28,7 +29,12 @@ constexpr double kMaxDeviations = 4;
 constexpr double kMaxFrameErrorRatio = 0.01;
 
 double DescriptorDistance(const MapRows& previous, int32_t landmark, const FeatureClass& feature_class) {
-  return (previous.descriptors.row(landmark).cast<float>() - feature_class.descriptor.cast<float>()).norm();
+  const DescriptorKind& kind = previous.descriptor_kind;
+  DescriptorMatrix look = feature_class.descriptor;
+  if (kind.type == DescriptorType::kBinary) RoundToBits(kind, &look);
+  const double distance =
+      (previous.descriptors.row(landmark).cast<float>() - look.row(0).cast<float>()).norm();
+  return distance * 512 / std::sqrt(kind.space().squared_norm);
 }
 
 std::vector<int32_t> RowsOfImages(const Classes& classes, const MapRows& previous) {
@@ -162,6 +168,7 @@ size_t PreviousMatches::NumMatched() const {
 
 Result<PreviousMatches> MatchPrevious(const Classes& classes, const MapRows& previous,
                                       const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckSameKind(previous.descriptor_kind, classes.descriptor_kind, path));
   PreviousMatches matches{.row_of_image = RowsOfImages(classes, previous)};
   const auto none =
       static_cast<size_t>(std::count(matches.row_of_image.begin(), matches.row_of_image.end(), kNotBefore));

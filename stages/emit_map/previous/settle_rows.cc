@@ -114,7 +114,7 @@ class Settler {
   // order: per new place, the landmark that comes there.
   void Reorder(const std::vector<int32_t>& order) {
     std::vector<MapLandmark> landmarks;
-    DescriptorMatrix descriptors(rows_.descriptors.rows(), kDescriptorDim);
+    DescriptorMatrix descriptors(rows_.descriptors.rows(), rows_.descriptors.cols());
     std::vector<LandmarkIdx> place_of(order.size());
     for (size_t i = 0; i < order.size(); ++i) {
       landmarks.push_back(rows_.landmarks[order[i]]);

@@ -75,7 +75,8 @@ Listed List(const Classes& classes, std::span<const ChangedClasses> members,
     for (const int i : members[change].*kind)
       listed.change_and_class.emplace_back(static_cast<int>(change), i);
   }
-  listed.descriptors.resize(static_cast<Eigen::Index>(listed.change_and_class.size()), kDescriptorDim);
+  listed.descriptors.resize(static_cast<Eigen::Index>(listed.change_and_class.size()),
+                            classes.descriptor_kind.num_values);
   for (size_t n = 0; n < listed.change_and_class.size(); ++n) {
     listed.descriptors.row(static_cast<Eigen::Index>(n)) =
         classes.classes[listed.change_and_class[n].second].descriptor;
@@ -91,7 +92,8 @@ void FindMoves(const Classes& classes, std::span<const ChangedClasses> members, 
   const Listed after = List(classes, members, &ChangedClasses::appeared);
   if (before.change_and_class.empty() || after.change_and_class.empty()) return;
   std::map<std::pair<int, int>, std::vector<Pair>> pairs;  // by the changes from and to which
-  for (const Match& match : MatchDescriptors(before.descriptors, after.descriptors, {})) {
+  for (const Match& match :
+       MatchDescriptors(before.descriptors, after.descriptors, classes.descriptor_kind.space(), {})) {
     const auto& [from, vanished] = before.change_and_class[match.idx1];
     const auto& [to, appeared] = after.change_and_class[match.idx2];
     pairs[{from, to}].push_back({classes.classes[vanished].position, classes.classes[appeared].position});

@@ -5,6 +5,7 @@
 
 #include "core/camera/panorama.h"
 #include "core/capture/sessions.h"
+#include "core/features/descriptor_kind_table.h"
 
 namespace cairn::match_features {
 namespace {
@@ -43,6 +44,7 @@ bool MatchImages::AllPosed() const {
 
 Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture) {
   MatchImages result;
+  CAIRN_ASSIGN_OR_RETURN(result.descriptor_kind, ReadDescriptorKind(database, DatabasePath(database)));
   CAIRN_ASSIGN_OR_RETURN(result.cameras, ReadDatabaseCameras(database));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadDatabaseImages(database));
   CAIRN_ASSIGN_OR_RETURN(auto num_keypoints, ReadRowCounts(database, "keypoints"));
@@ -76,18 +78,20 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
   return result;
 }
 
-int64_t ImageFeatures::NumBytes(int num_features, bool has_descriptors) {
+int64_t ImageFeatures::NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors) {
   const int64_t row_bytes =
-      sizeof(Keypoint) + sizeof(Eigen::Vector3d) + (has_descriptors ? kDescriptorDim : 0);
-  return PackedDescriptors::NumBytes(num_features) + row_bytes * num_features;
+      sizeof(Keypoint) + sizeof(Eigen::Vector3d) + (has_descriptors ? kind.num_values : 0);
+  return PackedDescriptors::NumBytes(num_features, kind.num_values) + row_bytes * num_features;
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
-                                        const Camera& camera, bool keep_descriptors) {
+                                        const Camera& camera, const DescriptorKind& kind,
+                                        bool keep_descriptors) {
   ImageFeatures features;
-  CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id));
+  features.space = kind.space();
+  CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
-  features.packed = PackedDescriptors(features.descriptors);
+  features.packed = PackedDescriptors(features.descriptors, features.space);
   features.bearings = BearingsOf(features.keypoints, camera);
   if (!keep_descriptors) features.descriptors = {};
   return features;

@@ -28,6 +28,7 @@ struct MatchImage {
 
 struct MatchImages {
   std::map<CameraId, Camera> cameras;
+  DescriptorKind descriptor_kind;
   std::vector<MatchImage> images;                   // those with features, ascending image_id
   std::map<std::string, ImageId> without_features;  // the others in the database, by name
 
@@ -43,17 +44,19 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 struct ImageFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
-  DescriptorMatrix descriptors;           // for guided matching; without rows where there is none
+  DescriptorSpace space;
+  DescriptorMatrix descriptors;  // for guided matching; without rows where there is none
   PackedDescriptors packed;
 
   // Upper limit of the memory that the features of an image take, bytes.
-  static int64_t NumBytes(int num_features, bool has_descriptors);
+  static int64_t NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors);
 };
 
 // Unpacked descriptors are left out where `keep_descriptors` is false.  Errors: Corrupt.  Throws like
 // ReadMatchImages.
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
-                                        const Camera& camera, bool keep_descriptors);
+                                        const Camera& camera, const DescriptorKind& kind,
+                                        bool keep_descriptors);
 
 // Only the bearings of ImageFeatures.  Errors: Corrupt.  Throws like ReadMatchImages.
 Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/features/features.h"
 #include "core/vocabulary/grow_vocabulary.h"
 
 namespace cairn::match_features {
@@ -24,12 +25,12 @@ constexpr int kBlockSize = 64;
 Result<DescriptorMatrix> SampleDescriptors(SQLite::Database& database, const MatchImages& images,
                                            int64_t num_descriptors, const Progress& progress) {
   const int64_t step = (num_descriptors + kMaxNumTrainingDescriptors - 1) / kMaxNumTrainingDescriptors;
-  DescriptorMatrix sample((num_descriptors + step - 1) / step, kDescriptorDim);
+  DescriptorMatrix sample((num_descriptors + step - 1) / step, images.descriptor_kind.num_values);
   int64_t first = 0;  // number of the image's first descriptor
   for (const MatchImage& image : images.images) {
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
     CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                           ReadDatabaseDescriptors(database, image.image_id));
+                           ReadDatabaseDescriptors(database, image.image_id, images.descriptor_kind));
     for (int64_t i = (first + step - 1) / step * step; i < first + descriptors.rows(); i += step) {
       sample.row(i / step) = descriptors.row(i - first);
     }
@@ -86,6 +87,7 @@ Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const Matc
                                           Progress& progress) {
   if (!vocabulary_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(Vocabulary vocabulary, ReadVocabulary(vocabulary_path));
+    CAIRN_RETURN_IF_ERROR(CheckSameKind(vocabulary.kind, images.descriptor_kind, vocabulary_path));
     if (vocabulary.num_words() > 1) return vocabulary;
     return MakeError(ErrorCode::kNoData,
                      "{}: a vocabulary of {} word(s) cannot distinguish images; build it from images with "
@@ -96,7 +98,8 @@ Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const Matc
   for (const MatchImage& image : images.images) num_descriptors += image.num_features;
   CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix sample,
                          SampleDescriptors(database, images, num_descriptors, progress));
-  return GrowVocabulary(sample, num_descriptors, kTreeOptions, seed, num_threads, progress);
+  return GrowVocabulary(sample, images.descriptor_kind, num_descriptors, kTreeOptions, seed, num_threads,
+                        progress);
 }
 
 Result<std::vector<std::vector<WordIdx>>> QuantizeImages(SQLite::Database& database,
@@ -111,8 +114,9 @@ Result<std::vector<std::vector<WordIdx>>> QuantizeImages(SQLite::Database& datab
     std::vector<DescriptorMatrix> block(std::min(kBlockSize, num_images - begin));
     for (size_t i = 0; i < block.size(); ++i) {
       if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while comparing images");
-      CAIRN_ASSIGN_OR_RETURN(block[i],
-                             ReadDatabaseDescriptors(database, images.images[idxs[begin + i]].image_id));
+      CAIRN_ASSIGN_OR_RETURN(
+          block[i],
+          ReadDatabaseDescriptors(database, images.images[idxs[begin + i]].image_id, images.descriptor_kind));
     }
     ParallelFor(static_cast<int64_t>(block.size()), num_threads, [&](int64_t i) {
       words[begin + i] = QuantizeDescriptors(vocabulary, block[i]);

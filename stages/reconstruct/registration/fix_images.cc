@@ -56,7 +56,7 @@ ImageFix FixImage(const PosedInput& posed, const SeenPoints& seen, int image, co
   for (const auto& [keypoint, track] : tracks)
     features.keypoints.push_back(posed.input.keypoints[image][keypoint]);
   features.descriptors =
-      DescriptorMatrix::Zero(static_cast<Eigen::Index>(features.keypoints.size()), kDescriptorDim);
+      DescriptorMatrix::Zero(static_cast<Eigen::Index>(features.keypoints.size()), kSiftDescriptorDim);
   const Query query = MakeQuery(std::move(features), camera, {});
   std::vector<PoseMeasurement> measurements;
   for (size_t k = 0; k < tracks.size(); ++k) {

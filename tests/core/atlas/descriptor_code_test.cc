@@ -17,7 +17,7 @@ using testing::ElementsAre;
 
 DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(num, kDescriptorDim);
+  DescriptorMatrix descriptors(num, kSiftDescriptorDim);
   for (Eigen::Index i = 0; i < descriptors.size(); ++i)
     descriptors.data()[i] = static_cast<uint8_t>(random.UniformInt(0, 90));
   return descriptors;
@@ -25,7 +25,7 @@ DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
 
 TEST(DescriptorCode, TellsTheCoefficientsThatVaryMost) {
   // All values of a descriptor together are larger or smaller: coefficient 0, the mean, and no other, varies.
-  DescriptorMatrix descriptors(5, kDescriptorDim);
+  DescriptorMatrix descriptors(5, kSiftDescriptorDim);
   for (int i = 0; i < 5; ++i) descriptors.row(i).setConstant(static_cast<uint8_t>(10 * (i + 1)));
   const CodeBook book = LearnCodeBook(descriptors);
   EXPECT_EQ(book.coefficients[0], 0);
@@ -40,7 +40,7 @@ TEST(DescriptorCode, TellsTheCoefficientsThatVaryMost) {
 }
 
 TEST(DescriptorCode, AboveTheMedianABitIsOne) {
-  DescriptorMatrix descriptors(5, kDescriptorDim);
+  DescriptorMatrix descriptors(5, kSiftDescriptorDim);
   for (int i = 0; i < 5; ++i) descriptors.row(i).setConstant(static_cast<uint8_t>(10 * (i + 1)));
   CodeBook book = LearnCodeBook(descriptors);
   const uint8_t* middle = descriptors.row(2).data();
@@ -65,7 +65,7 @@ TEST(DescriptorCode, HalfOfAllDescriptorsHaveEachBit) {
 TEST(DescriptorCode, TheOrderOfDescriptorsDoesNotMatter) {
   const DescriptorMatrix descriptors = RandomDescriptors(100, 2);
   EXPECT_EQ(LearnCodeBook(descriptors), LearnCodeBook(descriptors.colwise().reverse()));
-  EXPECT_EQ(LearnCodeBook(DescriptorMatrix(0, kDescriptorDim)), CodeBook());
+  EXPECT_EQ(LearnCodeBook(DescriptorMatrix(0, kSiftDescriptorDim)), CodeBook());
 }
 
 TEST(DescriptorCode, CostsTheMarginsOfTheBitsThatDiffer) {

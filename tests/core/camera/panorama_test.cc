@@ -101,7 +101,7 @@ TEST(Panorama, EveryDirectionIsKeptByExactlyOneView) {
       if (!pixel) continue;
       Features features;
       features.keypoints = {{static_cast<float>(pixel->x()), static_cast<float>(pixel->y()), 1, 0}};
-      features.descriptors = DescriptorMatrix::Zero(1, kDescriptorDim);
+      features.descriptors = DescriptorMatrix::Zero(1, kSiftDescriptorDim);
       KeepSectorOfView(camera, options.num_panorama_views, &features);
       ASSERT_EQ(static_cast<size_t>(features.descriptors.rows()), features.keypoints.size());
       num_kept += static_cast<int>(features.keypoints.size());

@@ -14,12 +14,12 @@ namespace cairn {
 inline Features RandomFeatures(uint64_t seed, int num) {
   Random random(seed);
   Features features;
-  features.descriptors.resize(num, kDescriptorDim);
+  features.descriptors.resize(num, kSiftDescriptorDim);
   for (int i = 0; i < num; ++i) {
     features.keypoints.push_back({static_cast<float>(random.Uniform(0, 640)),
                                   static_cast<float>(random.Uniform(0, 480)),
                                   static_cast<float>(random.Uniform(1, 9)), 0.5F});
-    for (int k = 0; k < kDescriptorDim; ++k)
+    for (int k = 0; k < kSiftDescriptorDim; ++k)
       features.descriptors(i, k) = static_cast<uint8_t>(random.UniformInt(0, 90));
   }
   return features;

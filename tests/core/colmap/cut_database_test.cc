@@ -29,7 +29,7 @@ class CutDatabase : public testing::Test {
     for (ImageId image_id = 1; image_id <= 6; ++image_id) {
       WriteDatabaseImage(database, {image_id, std::to_string(image_id) + ".jpg", 1});
       Features features{.keypoints = std::vector<Keypoint>(400, Keypoint{1, 2, 3, 0}), .descriptors = {}};
-      features.descriptors.setOnes(400, kDescriptorDim);
+      features.descriptors.setOnes(400, kSiftDescriptorDim);
       WriteDatabaseFeatures(database, image_id, features);
     }
   }

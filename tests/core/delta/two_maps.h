@@ -14,7 +14,7 @@ inline MapRows SmallRows() {
                               .scale_m = 1e-6,
                               .num_observations = 3});
   }
-  rows.descriptors = DescriptorMatrix::Constant(5, kDescriptorDim, 7);
+  rows.descriptors = DescriptorMatrix::Constant(5, kSiftDescriptorDim, 7);
   rows.stations = {{.position = {0, 0}, .heading_deg = 90},
                    {.position = {1, 0}, .heading_deg = -12.345, .is_covered = false},
                    {.position = {-2.5, 0.25}}};
@@ -53,7 +53,7 @@ inline MapRows ChangedRows() {
   MapLandmark last = old[0];
   last.class_id = 21;
   rows.landmarks = {old[0], old[2], added, old[3], old[4], last};
-  rows.descriptors = DescriptorMatrix::Constant(6, kDescriptorDim, 7);
+  rows.descriptors = DescriptorMatrix::Constant(6, kSiftDescriptorDim, 7);
   rows.stations = {{.position = {5, 5}}, rows.stations[0], rows.stations[2]};
   rows.station_edges = {{0, 1}, {1, 2}};
   rows.images[1].image_id = 3;

@@ -121,9 +121,16 @@ TEST(BestTwoSweep, SixteenLanesFindTheTwoLargestKeysOfRowsAndColumns) {
         for (const uint8_t x : column) sum += 128 * x;
         bias.push_back(sum);
       }
-      best_two_internal::SweepAll<Emulated>({packed_rows.data(), packed_columns.data(), bias.data(),
-                                             num_row_groups, num_column_groups, bits, row_states.data(),
-                                             row_keys.data(), column_keys.data()});
+      best_two_internal::SweepAll<Emulated>({.rows = packed_rows.data(),
+                                             .columns = packed_columns.data(),
+                                             .bias = bias.data(),
+                                             .num_chunks = kNumSiftChunks,
+                                             .num_row_groups = num_row_groups,
+                                             .num_column_groups = num_column_groups,
+                                             .index_bits = bits,
+                                             .row_states = row_states.data(),
+                                             .row_keys = row_keys.data(),
+                                             .column_keys = column_keys.data()});
       for (size_t i = 0; i < rows.size(); ++i) {
         const std::array<uint32_t, 2> expected = OracleKeys(rows[i], columns, bits);
         EXPECT_EQ(row_keys[2 * i], expected[0]) << i;

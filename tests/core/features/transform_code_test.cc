@@ -12,7 +12,7 @@ namespace {
 
 DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(count, kDescriptorDim);
+  DescriptorMatrix descriptors(count, kSiftDescriptorDim);
   for (Eigen::Index i = 0; i < descriptors.size(); ++i) {
     // Many small values and few large ones, as in SIFT.
     descriptors.data()[i] = static_cast<uint8_t>(
@@ -29,7 +29,7 @@ double MeanSquaredError(const DescriptorMatrix& a, const DescriptorMatrix& b) {
 TEST(TransformCode, AConstantIsOneCoefficient) {
   TransformCode code{.step = 24};
   code.mean.fill(50);
-  std::array<uint8_t, kDescriptorDim> descriptor;
+  std::array<uint8_t, kSiftDescriptorDim> descriptor;
   descriptor.fill(58);
   TransformLevels levels = LevelsOf(descriptor.data(), code);
   EXPECT_EQ(levels[0], 4);  // 90.5 / 24 = 3.77
@@ -46,8 +46,8 @@ TEST(TransformCode, AConstantIsOneCoefficient) {
 TEST(TransformCode, AWaveOverOrientationsIsOneCoefficient) {
   TransformCode code{.step = 10};
   code.mean.fill(100);
-  std::array<uint8_t, kDescriptorDim> descriptor;
-  for (int i = 0; i < kDescriptorDim; ++i)
+  std::array<uint8_t, kSiftDescriptorDim> descriptor;
+  for (int i = 0; i < kSiftDescriptorDim; ++i)
     descriptor[i] = static_cast<uint8_t>(std::lround(100 + 40 * std::cos(2 * M_PI * (i % 8) / 8)));
   TransformLevels levels = LevelsOf(descriptor.data(), code);
   EXPECT_EQ(levels[1], 32);  // 40 sqrt(16 * 4) = 320
@@ -63,7 +63,7 @@ TEST(TransformCode, QuantizedDescriptorsAreWhatTheirLevelsStandFor) {
     DescriptorMatrix descriptors = RandomDescriptors(300, 3);
     const TransformCode code = QuantizeByTransform(step, &descriptors);
     for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
-      std::array<uint8_t, kDescriptorDim> stands_for;
+      std::array<uint8_t, kSiftDescriptorDim> stands_for;
       DescriptorOf(LevelsOf(descriptors.row(i).data(), code), code, stands_for.data());
       EXPECT_TRUE(std::equal(stands_for.begin(), stands_for.end(), descriptors.row(i).data())) << i;
     }

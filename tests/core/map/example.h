@@ -81,7 +81,7 @@ inline EmitExample MakeEmitExample() {
   vocabulary.depth = 1;
   vocabulary.nodes.resize(3);
   vocabulary.nodes[0].num_children = 2;
-  vocabulary.centres = DescriptorMatrix::Zero(3, kDescriptorDim);
+  vocabulary.centres = DescriptorMatrix::Zero(3, kSiftDescriptorDim);
   vocabulary.centres(1, 0) = 255;
   vocabulary.centres(2, 1) = 255;
   (void)NumberVocabularyNodes(&vocabulary);

@@ -41,7 +41,7 @@ MapRows RowsWithRegions(const std::vector<int>& sizes, int num_others) {
     for (int i = 0; i < size; ++i) region.landmarks.push_back(next++);
   }
   rows.landmarks.resize(next + num_others);
-  rows.descriptors = DescriptorMatrix::Zero(next + num_others, kDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(next + num_others, kSiftDescriptorDim);
   return rows;
 }
 

@@ -170,11 +170,40 @@ TEST(MapFile, EveryTruncationIsRefused) {
 
 TEST(MapFile, NewerMajorVersionNamesTheWriter) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("newer.cairn")).ok());
-  SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3003");
+  SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 4003");
   const Error error = ReadMapRows(MapPath("newer.cairn")).error();
   EXPECT_EQ(error.code, ErrorCode::kTooNew);
-  EXPECT_THAT(error.message, HasSubstr("3.3, written by cairn test"));
+  EXPECT_THAT(error.message, HasSubstr("4.3, written by cairn test"));
   EXPECT_THAT(error.message, HasSubstr("Update the program"));
+}
+
+// Floating-point descriptors of 100 values, not whole bytes of a block at 3 bits each, and binary ones.
+TEST(MapFile, DescriptorsOfOtherKindsAreReadAsTheyWereWritten) {
+  for (const DescriptorKind& kind : {DescriptorKind{DescriptorType::kFloat, 101, "net"},
+                                     DescriptorKind{DescriptorType::kBinary, 488, ""}}) {
+    MapRows rows = ExampleRows();
+    rows.descriptor_kind = kind;
+    rows.descriptor_code.reset();
+    const auto num = static_cast<Eigen::Index>(rows.landmarks.size());
+    const int unit = kind.type == DescriptorType::kBinary ? 2 * kind.space().offset : 40;
+    rows.descriptors.resize(num, kind.num_values);
+    for (Eigen::Index i = 0; i < rows.descriptors.size(); ++i)
+      rows.descriptors.data()[i] =
+          static_cast<uint8_t>(unit * (i * 7 % 11 % (kind.type == DescriptorType::kBinary ? 2 : 5)));
+    rows.vocabulary = {};
+    ASSERT_TRUE(WriteMapRows(rows, MapPath("kind.cairn")).ok());
+    EXPECT_EQ(SQLite::Database(MapPath("kind.cairn")).execAndGet("PRAGMA user_version").getInt(), 3007);
+    const Result<MapRows> read = ReadMapRows(MapPath("kind.cairn"));
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_EQ(read->descriptor_kind, kind);
+    EXPECT_EQ(read->descriptors, rows.descriptors);
+  }
+}
+
+TEST(MapFile, DescriptorsOfAnotherWidthThanTheirKindAreNotWritten) {
+  MapRows rows = ExampleRows();
+  rows.descriptor_kind = {DescriptorType::kFloat, 64, ""};
+  EXPECT_EQ(WriteMapRows(rows, MapPath("wrong.cairn")).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST(MapFile, NewerMinorVersionIsRead) {

@@ -25,7 +25,7 @@ inline MapRows PackedRows(int step = 24) {
   rows.landmarks.clear();
   Random random(7);
   constexpr int kNumLandmarks = 1500, kNumImages = 70;
-  rows.descriptors.resize(kNumLandmarks, kDescriptorDim);
+  rows.descriptors.resize(kNumLandmarks, kSiftDescriptorDim);
   for (Eigen::Index i = 0; i < rows.descriptors.size(); ++i)
     rows.descriptors.data()[i] = static_cast<uint8_t>(std::min(255.0, 30 * std::abs(random.Normal(0, 1))));
   for (int i = 0; i < kNumLandmarks; ++i) {

@@ -10,7 +10,7 @@ namespace cairn {
 namespace {
 
 DescriptorMatrix RandomRows(int num_rows, int max_value, Random& random) {
-  DescriptorMatrix rows(num_rows, kDescriptorDim);
+  DescriptorMatrix rows(num_rows, kSiftDescriptorDim);
   for (int i = 0; i < rows.size(); ++i) {
     rows.data()[i] = static_cast<uint8_t>(random.UniformInt(0, max_value));
   }
@@ -35,9 +35,9 @@ TEST(NearestCentre, HasTheLargestDotProductForAnyNumberOfCentres) {
 }
 
 TEST(NearestCentre, EqualCentresGiveTheFirst) {
-  const DescriptorMatrix centres = DescriptorMatrix::Constant(9, kDescriptorDim, 255);
+  const DescriptorMatrix centres = DescriptorMatrix::Constant(9, kSiftDescriptorDim, 255);
   EXPECT_EQ(NearestCentre(centres.data(), 9, centres.data()), 0);
-  const DescriptorMatrix black = DescriptorMatrix::Zero(6, kDescriptorDim);
+  const DescriptorMatrix black = DescriptorMatrix::Zero(6, kSiftDescriptorDim);
   EXPECT_EQ(NearestCentre(black.data(), 6, centres.data()), 0);
 }
 
@@ -45,14 +45,14 @@ TEST(NearestCentre, SumsAndSquaredDistancesAreExact) {
   Random random(5);
   const DescriptorMatrix rows = RandomRows(7, 255, random);
   const DescriptorMatrix centre = RandomRows(1, 255, random);
-  std::array<int32_t, kDescriptorDim> sums = {};
-  for (int i = 0; i < 7; ++i) AddDescriptor(rows.row(i).data(), sums.data());
-  for (int d = 0; d < kDescriptorDim; ++d) EXPECT_EQ(sums[d], rows.col(d).cast<int>().sum());
+  std::array<int32_t, kSiftDescriptorDim> sums = {};
+  for (int i = 0; i < 7; ++i) AddDescriptor(rows.row(i).data(), kSiftDescriptorDim, sums.data());
+  for (int d = 0; d < kSiftDescriptorDim; ++d) EXPECT_EQ(sums[d], rows.col(d).cast<int>().sum());
   // Nearer than before, except for the fourth.
   std::array<int32_t, 7> nearest;
   nearest.fill(INT32_MAX);
   nearest[3] = 5;
-  LowerSquaredDistances(rows.data(), 7, centre.data(), nearest.data());
+  LowerSquaredDistances(rows.data(), 7, centre.data(), kSiftDescriptorDim, nearest.data());
   for (int i = 0; i < 7; ++i) {
     EXPECT_EQ(nearest[i], i == 3 ? 5 : (rows.row(i).cast<int>() - centre.row(0).cast<int>()).squaredNorm());
   }

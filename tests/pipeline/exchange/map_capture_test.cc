@@ -37,7 +37,7 @@ MapRows SmallMap() {
   rows.landmarks[0].scale_m = 0.02;
   rows.landmarks[1].position = {0, 0, 5};
   rows.landmarks[2].position = {9, 0, 2};
-  rows.descriptors.resize(3, kDescriptorDim);
+  rows.descriptors.resize(3, kSiftDescriptorDim);
   for (int i = 0; i < 3; ++i) rows.descriptors.row(i).setConstant(static_cast<uint8_t>(10 * i + 1));
   Pose right;
   right.translation = {-1, 0, 0};

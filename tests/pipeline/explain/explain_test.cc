@@ -40,7 +40,7 @@ MapRows FiveStations() {
   MapRows rows;
   rows.name = "row";
   rows.k = 4;
-  rows.descriptors = DescriptorMatrix::Zero(10, kDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(10, kSiftDescriptorDim);
   for (int i = 0; i < 10; ++i) {
     rows.landmarks.push_back({.class_id = static_cast<ClassId>(i), .position = {0.5 * i, 3, 1}});
     rows.descriptors(i, i) = 255;  // at right angles to all others

@@ -70,7 +70,7 @@ TEST_F(AtlasLocalizerTest, AnImageOfAnotherBuildingIsOfNoMap) {
 
 TEST_F(AtlasLocalizerTest, AnImageWithoutFeaturesIsOfNoMap) {
   Features none;
-  none.descriptors.resize(0, kDescriptorDim);
+  none.descriptors.resize(0, kSiftDescriptorDim);
   const AtlasAnswer answer = Answer(Open(Rows()), none, Room(0).camera);
   EXPECT_THAT(answer.hypotheses, IsEmpty());
   EXPECT_THAT(answer.maps_tried, IsEmpty());

@@ -40,10 +40,10 @@ class ThreeRoomsTest : public testing::Test {
     constexpr size_t kStride = 7;
     AtlasRows atlas;
     atlas.name = "rooms";
-    DescriptorMatrix all(0, kDescriptorDim);
+    DescriptorMatrix all(0, kSiftDescriptorDim);
     for (int room = 0; room < kNumRooms; ++room) {
       const DescriptorMatrix& more = Room(room).descriptors;
-      all.conservativeResize(all.rows() + more.rows(), kDescriptorDim);
+      all.conservativeResize(all.rows() + more.rows(), kSiftDescriptorDim);
       all.bottomRows(more.rows()) = more;
     }
     atlas.code_book = LearnCodeBook(all);

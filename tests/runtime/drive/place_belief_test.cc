@@ -38,7 +38,7 @@ MapRows Corridor() {
   }
   for (int k = 0; k < 5 * (kNumImages + 1); ++k)
     rows.landmarks.push_back({.position = {k / 5 + 4.5, 0.1 * (k % 5), 1}});
-  rows.descriptors = DescriptorMatrix::Zero(5 * (kNumImages + 1), kDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(5 * (kNumImages + 1), kSiftDescriptorDim);
   return rows;
 }
 

@@ -32,7 +32,7 @@ MapRows PathRows() {
     rows.images.back().landmarks = {i % 2};
   }
   rows.landmarks.resize(2);
-  rows.descriptors = DescriptorMatrix::Zero(2, kDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(2, kSiftDescriptorDim);
   rows.descriptors.row(0).head(4).setConstant(255);
   rows.descriptors.row(1).tail(4).setConstant(255);
   rows.appearance = {{{0}, false, {{1, 20}}}, {{1}, true, {{2, 20}}}, {{2}, true, {{3, 20}}},

@@ -87,7 +87,7 @@ TEST(PlaceModel, SaysWhichImagesShowAPlaceAndWhichPlaceAnImage) {
 
 TEST(PlaceModel, AnImageWithoutFeaturesCouldBeAnywhere) {
   const PlaceModel model = ModelOf(Wings());
-  const PlaceScores nothing = model.Look(DescriptorMatrix(0, kDescriptorDim));
+  const PlaceScores nothing = model.Look(DescriptorMatrix(0, kSiftDescriptorDim));
   EXPECT_THAT(nothing.scores, testing::Each(0));
   EXPECT_THAT(nothing.probabilities, testing::Each(testing::DoubleEq(1.0 / 12)));
   EXPECT_EQ(StartHypotheses::Make(model, nothing, 11).error().code, ErrorCode::kNoData);

@@ -29,8 +29,8 @@ Wall MakeWall(bool alike, const std::vector<Eigen::Vector2d>& extra_px, double s
   camera.model = CameraModel::kSimplePinhole;
   camera.params = {400, 300, 300};
   const auto look = RandomDescriptor(random);
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> looks;
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> seen;
+  std::vector<Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>> looks;
+  std::vector<Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>> seen;
   for (int i = 0; i < kSide * kSide; ++i) {
     const Eigen::Vector2d pixel(125 + 50 * (i % kSide), 125 + 50 * (i / kSide));
     const Eigen::Vector2d ray = (pixel - Eigen::Vector2d(300, 300)) / 400;
@@ -46,9 +46,9 @@ Wall MakeWall(bool alike, const std::vector<Eigen::Vector2d>& extra_px, double s
       seen.push_back(looks.back());
     }
   }
-  wall.landmarks.descriptors.resize(kSide * kSide, kDescriptorDim);
+  wall.landmarks.descriptors.resize(kSide * kSide, kSiftDescriptorDim);
   for (int i = 0; i < kSide * kSide; ++i) wall.landmarks.descriptors.row(i) = looks[i];
-  features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+  features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kSiftDescriptorDim);
   for (size_t i = 0; i < seen.size(); ++i) features.descriptors.row(static_cast<Eigen::Index>(i)) = seen[i];
   wall.query = MakeQuery(std::move(features), camera, {});
   return wall;
@@ -186,7 +186,8 @@ struct TwoPlaces {
         Keypoint keypoint = features.keypoints[i];
         if (copy == 1) keypoint.x += keypoint.x < 320 ? 250 : -250;
         seen.keypoints.push_back(keypoint);
-        seen.descriptors.conservativeResize(static_cast<Eigen::Index>(seen.keypoints.size()), kDescriptorDim);
+        seen.descriptors.conservativeResize(static_cast<Eigen::Index>(seen.keypoints.size()),
+                                            kSiftDescriptorDim);
         seen.descriptors.bottomRows<1>() = features.descriptors.row(i);
       }
     }

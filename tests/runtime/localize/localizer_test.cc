@@ -249,7 +249,7 @@ TEST(Localizer, TwoPosesOfEqualSupportAreAmbiguous) {
   const Features right = RenderFeatures(Room(), PoseAt({2, 0, 1.2}, -90), {.num_outliers = 0}, 2);
   Features both = left;
   both.keypoints.insert(both.keypoints.end(), right.keypoints.begin(), right.keypoints.end());
-  both.descriptors.conservativeResize(left.descriptors.rows() + right.descriptors.rows(), kDescriptorDim);
+  both.descriptors.conservativeResize(left.descriptors.rows() + right.descriptors.rows(), kSiftDescriptorDim);
   both.descriptors.bottomRows(right.descriptors.rows()) = right.descriptors;
   LocalizerOptions options;
   options.retrieve.max_num_regions = 8;

@@ -179,7 +179,7 @@ TEST(RegionTracker, WithholdsAVotedFixUntilTheLookAlikeIsExcluded) {
   MapRows rows = RoomsAlike(2);
   Random random(11);
   for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
-    for (int d = 0; d < kDescriptorDim; ++d) {
+    for (int d = 0; d < kSiftDescriptorDim; ++d) {
       const double value = random.Normal(rows.descriptors(i, d), 16);
       rows.descriptors(i, d) = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
     }

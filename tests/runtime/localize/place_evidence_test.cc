@@ -21,7 +21,7 @@ class EvidenceOfPlaceTest : public testing::Test {
     for (const auto& [column, row] : {std::pair(5, 5), {45, 5}, {95, 5}, {5, 95}, {7, 95}, {130, 50}}) {
       rows_.landmarks.push_back({.position = {(column - 50) * 0.04, 4, -(row - 50) * 0.04}});
     }
-    rows_.descriptors = DescriptorMatrix::Zero(6, kDescriptorDim);
+    rows_.descriptors = DescriptorMatrix::Zero(6, kSiftDescriptorDim);
     AddImage({0, 0, 0}, 90, {0, 1, 2, 3, 5});
   }
 

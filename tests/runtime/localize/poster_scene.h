@@ -75,7 +75,7 @@ inline MapRows MakePosterMap(const PosterScene& scene) {
   rows.cameras = {scene.camera};
   rows.landmark_choice = "all";
   std::vector<build_vocabulary::ImageDescriptors> documents;
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> descriptors;
+  std::vector<Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>> descriptors;
   for (int i = 0; i < 3; ++i) {
     MapImage image{.image_id = static_cast<ImageId>(i + 1),
                    .name = "view" + std::to_string(i),
@@ -98,10 +98,10 @@ inline MapRows MakePosterMap(const PosterScene& scene) {
     documents.push_back({image.image_id, features.descriptors});
     rows.images.push_back(std::move(image));
   }
-  rows.descriptors.resize(static_cast<Eigen::Index>(descriptors.size()), kDescriptorDim);
+  rows.descriptors.resize(static_cast<Eigen::Index>(descriptors.size()), kSiftDescriptorDim);
   for (size_t i = 0; i < descriptors.size(); ++i) rows.descriptors.row(i) = descriptors[i];
   NoProgress progress;
-  rows.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, 0, 1, progress);
+  rows.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, {}, 0, 1, progress);
   return rows;
 }
 

@@ -54,7 +54,7 @@ struct RegionRoom {
     for (const std::vector<int>& points : of_region) kept.insert(kept.end(), points.begin(), points.end());
     std::sort(kept.begin(), kept.end());
     kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
-    rows.descriptors.resize(static_cast<Eigen::Index>(kept.size()), kDescriptorDim);
+    rows.descriptors.resize(static_cast<Eigen::Index>(kept.size()), kSiftDescriptorDim);
     for (size_t i = 0; i < kept.size(); ++i) {
       rows.landmarks.push_back(
           {.class_id = static_cast<ClassId>(i), .position = room.points[kept[i]], .num_observations = 3});

@@ -32,7 +32,7 @@ std::shared_ptr<const Map> SmallMap() {
                            .station = i});
     rows.landmarks.push_back({.position = {static_cast<double>(i), 2, 0}});
   }
-  rows.descriptors = DescriptorMatrix::Zero(3, kDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(3, kSiftDescriptorDim);
   rows.images[0].landmarks = {0, 1};
   rows.images[1].landmarks = {0, 1, 2};
   rows.images[2].landmarks = {2};

@@ -169,7 +169,7 @@ TEST(Rig, ABlindCameraDoesNoHarm) {
   const Pose truth = PoseAt({0.4, 0.3, 1.2}, 20);
   std::vector<RigFeatures> images = See(truth, Mast(3), {}, 9);
   images[1].features = Features();
-  images[1].features.descriptors.resize(0, kDescriptorDim);
+  images[1].features.descriptors.resize(0, kSiftDescriptorDim);
   const Localization found = *Localizer(RoomMap()).LocalizeRigFeatures(images);
   ASSERT_TRUE(found.has_fix()) << found.message;
   EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.03);

@@ -21,18 +21,18 @@ struct SyntheticRoom {
   MapRows rows;  // landmark positions are the true ones
 };
 
-inline Eigen::Matrix<uint8_t, 1, kDescriptorDim> RandomDescriptor(Random& random) {
-  Eigen::Matrix<double, 1, kDescriptorDim> direction;
-  for (int i = 0; i < kDescriptorDim; ++i) direction[i] = std::pow(random.Uniform(), 3);
+inline Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> RandomDescriptor(Random& random) {
+  Eigen::Matrix<double, 1, kSiftDescriptorDim> direction;
+  for (int i = 0; i < kSiftDescriptorDim; ++i) direction[i] = std::pow(random.Uniform(), 3);
   direction *= 512 / direction.norm();
   return direction.array().min(255).round().cast<uint8_t>();
 }
 
 // The same feature seen again: every entry off by a few units.
-inline Eigen::Matrix<uint8_t, 1, kDescriptorDim> NoisyDescriptor(
-    const Eigen::Matrix<uint8_t, 1, kDescriptorDim>& descriptor, Random& random) {
-  Eigen::Matrix<uint8_t, 1, kDescriptorDim> noisy;
-  for (int i = 0; i < kDescriptorDim; ++i) {
+inline Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> NoisyDescriptor(
+    const Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>& descriptor, Random& random) {
+  Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim> noisy;
+  for (int i = 0; i < kSiftDescriptorDim; ++i) {
     noisy[i] = static_cast<uint8_t>(std::clamp<double>(std::round(random.Normal(descriptor[i], 8)), 0, 255));
   }
   return noisy;
@@ -64,7 +64,7 @@ inline Features RenderFeatures(const SyntheticRoom& room, const Pose& cam_from_w
                                const RenderOptions& options, uint64_t seed) {
   Random random(seed);
   Features features;
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> descriptors;
+  std::vector<Eigen::Matrix<uint8_t, 1, kSiftDescriptorDim>> descriptors;
   for (size_t i = 0; i < room.points.size(); ++i) {
     const auto pixel = ImageFromCamera(room.camera, cam_from_world * room.points[i]);
     const bool is_seen = pixel && pixel->x() > 0 && pixel->y() > 0 && pixel->x() < room.camera.width &&
@@ -84,7 +84,7 @@ inline Features RenderFeatures(const SyntheticRoom& room, const Pose& cam_from_w
                                   static_cast<float>(random.Uniform(0, room.camera.height)), 2, 0});
     descriptors.push_back(RandomDescriptor(random));
   }
-  features.descriptors.resize(static_cast<Eigen::Index>(descriptors.size()), kDescriptorDim);
+  features.descriptors.resize(static_cast<Eigen::Index>(descriptors.size()), kSiftDescriptorDim);
   for (size_t i = 0; i < descriptors.size(); ++i) features.descriptors.row(i) = descriptors[i];
   return features;
 }
@@ -93,7 +93,7 @@ inline Features RenderFeatures(const SyntheticRoom& room, const Pose& cam_from_w
 inline SyntheticRoom MakeUnmappedRoom(uint64_t seed, int num_landmarks) {
   SyntheticRoom room;
   Random random(seed);
-  room.descriptors.resize(num_landmarks, kDescriptorDim);
+  room.descriptors.resize(num_landmarks, kSiftDescriptorDim);
   for (int i = 0; i < num_landmarks; ++i) {
     const double z = random.Uniform(0, 3), along = random.Uniform(-1, 1), depth = random.Uniform(0, 0.3);
     const Eigen::Vector3d walls[] = {{5 - depth, 4 * along, z},
@@ -160,7 +160,7 @@ inline SyntheticRoom MakeSyntheticRoom(uint64_t seed, int num_landmarks = 1600) 
       options;  // few words, as those of a large survey: images from elsewhere share some
   options.tree.descriptors_per_word = 40;
   options.tree.min_num_descriptors_to_split = 20;
-  rows.vocabulary = *build_vocabulary::BuildVocabulary(documents, options, seed, 2, progress);
+  rows.vocabulary = *build_vocabulary::BuildVocabulary(documents, {}, options, seed, 2, progress);
   return room;
 }
 

@@ -12,7 +12,7 @@ namespace cairn {
 // A descriptor that is word `word`, and no other, of VisualMemory.
 inline DescriptorMatrix DescriptorsOf(const std::vector<WordIdx>& words) {
   DescriptorMatrix descriptors =
-      DescriptorMatrix::Zero(static_cast<Eigen::Index>(words.size()), kDescriptorDim);
+      DescriptorMatrix::Zero(static_cast<Eigen::Index>(words.size()), kSiftDescriptorDim);
   for (size_t i = 0; i < words.size(); ++i) descriptors(static_cast<Eigen::Index>(i), words[i]) = 255;
   return descriptors;
 }
@@ -30,12 +30,12 @@ inline MapRows VisualMemory(const std::vector<std::vector<WordIdx>>& words_of_im
   rows.landmarks.resize(1);
   rows.descriptors = DescriptorsOf({0});
   Vocabulary& vocabulary = rows.vocabulary;
-  vocabulary.branching = kDescriptorDim;
+  vocabulary.branching = kSiftDescriptorDim;
   vocabulary.depth = 1;
-  vocabulary.nodes.resize(1 + kDescriptorDim);
-  vocabulary.nodes[0].num_children = kDescriptorDim;
-  vocabulary.centres = DescriptorMatrix::Zero(1 + kDescriptorDim, kDescriptorDim);
-  for (int i = 0; i < kDescriptorDim; ++i) vocabulary.centres(1 + i, i) = 255;
+  vocabulary.nodes.resize(1 + kSiftDescriptorDim);
+  vocabulary.nodes[0].num_children = kSiftDescriptorDim;
+  vocabulary.centres = DescriptorMatrix::Zero(1 + kSiftDescriptorDim, kSiftDescriptorDim);
+  for (int i = 0; i < kSiftDescriptorDim; ++i) vocabulary.centres(1 + i, i) = 255;
   EXPECT_TRUE(NumberVocabularyNodes(&vocabulary).ok());
   for (size_t i = 0; i < words_of_image.size(); ++i) {
     rows.images.push_back({.image_id = static_cast<ImageId>(i + 1),

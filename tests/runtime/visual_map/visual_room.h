@@ -117,11 +117,11 @@ struct VisualRoom {
         }
       }
     }
-    rows.descriptors.resize(static_cast<Eigen::Index>(points.size()), kDescriptorDim);
+    rows.descriptors.resize(static_cast<Eigen::Index>(points.size()), kSiftDescriptorDim);
     for (size_t i = 0; i < points.size(); ++i) {
       rows.landmarks.push_back({.class_id = classes.classes[i].class_id, .position = points[i]});
       // As long as RootSIFT's, and mostly apart.
-      Eigen::Matrix<double, 1, kDescriptorDim> values;
+      Eigen::Matrix<double, 1, kSiftDescriptorDim> values;
       for (double& value : values) value = std::pow(random.Uniform(), 6);
       values *= 512 / values.norm();
       rows.descriptors.row(static_cast<Eigen::Index>(i)) = values.cwiseMin(255.0).cast<uint8_t>();

@@ -51,7 +51,7 @@ struct RoomOfWalls {
   Query Look(const Eigen::Vector2d& at, double heading_rad) const {
     Features features;
     const auto seen = room.See(VisualRoom::PoseAt(at, heading_rad));
-    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kSiftDescriptorDim);
     for (const auto& [point, keypoint] : seen) {
       features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())) =
           room.rows.descriptors.row(point);

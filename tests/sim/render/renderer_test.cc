@@ -154,7 +154,7 @@ TEST(Renderer, GivesFeaturesThatMatchWhereTheGeometrySays) {
   }
   int num_right = 0;
   const std::vector<Match> matches =
-      MatchDescriptors(features[0].descriptors, features[1].descriptors, DescriptorMatcherOptions());
+      MatchDescriptors(features[0].descriptors, features[1].descriptors, {}, DescriptorMatcherOptions());
   for (const Match& match : matches) {
     const Keypoint &a = features[0].keypoints[match.idx1], &b = features[1].keypoints[match.idx2];
     const Eigen::Vector2d ray = *CameraFromImage(survey.camera, {a.x, a.y});

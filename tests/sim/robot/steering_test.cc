@@ -83,7 +83,7 @@ class Steering : public testing::Test {
                                 .num_observations = 1});
       kept.push_back(static_cast<Eigen::Index>(i));
     }
-    rows.descriptors.resize(static_cast<Eigen::Index>(kept.size()), kDescriptorDim);
+    rows.descriptors.resize(static_cast<Eigen::Index>(kept.size()), kSiftDescriptorDim);
     for (size_t i = 0; i < kept.size(); ++i)
       rows.descriptors.row(static_cast<Eigen::Index>(i)) = features.descriptors.row(kept[i]);
     rows.images.push_back(std::move(image));
