@@ -66,8 +66,9 @@ inline std::vector<Eigen::Vector3d> RoomPoints(const Eigen::Vector2d& low, const
   Random random(seed);
   std::vector<Eigen::Vector3d> points;
   while (static_cast<int>(points.size()) < num_points) {
-    Eigen::Vector3d point(random.Uniform(low.x(), high.x()), random.Uniform(low.y(), high.y()),
-                          random.Uniform(-1, 1.6));
+    const double z = random.Uniform(-1, 1.6), y = random.Uniform(low.y(), high.y()),
+                 x = random.Uniform(low.x(), high.x());
+    Eigen::Vector3d point(x, y, z);
     switch (random.UniformInt(0, 5)) {
       case 0:
         point.x() = low.x();

@@ -181,13 +181,15 @@ TEST(PosteriorOnLattice, IsThatOfBruteForce) {
     options.visual_sigma_px = sigma_px;
     options.visual_sigma_octaves = 0.05 * sigma_px / 4;
     for (int i = 0; i < 2; ++i) {
-      const Eigen::Vector2d truth(random.Uniform(1.6, 3.4), random.Uniform(1.35, 2.65));
+      const double truth_y = random.Uniform(1.35, 2.65), truth_x = random.Uniform(1.6, 3.4);
+      const Eigen::Vector2d truth(truth_x, truth_y);
       auto seen = Clean().room.SeenLandmarks(VisualRoom::PoseAt(truth, 0));
       while (seen.size() > 6)
         seen.erase(seen.begin() + random.UniformInt(0, static_cast<int>(seen.size()) - 1));
       for (SeenLandmark& match : seen) {
-        match.seen += Eigen::Vector3d(random.Normal(0, sigma_px), random.Normal(0, sigma_px),
-                                      random.Normal(0, options.visual_sigma_octaves));
+        const double octaves = random.Normal(0, options.visual_sigma_octaves);
+        const double y = random.Normal(0, sigma_px), x = random.Normal(0, sigma_px);
+        match.seen += Eigen::Vector3d(x, y, octaves);
       }
       const std::vector<double> expected = BruteForcePosterior(*map, seen, options);
       const auto found = PosteriorOnLattice(*map, seen, options);
@@ -212,11 +214,14 @@ NoisyErrors LocalizeNoisy(const Surveyed& survey, double noise_px) {
   Random random(12);
   NoisyErrors errors;
   for (int i = 0; i < kNumImages; ++i) {
-    const Eigen::Vector2d truth(random.Uniform(1.5, 3.5), random.Uniform(1.25, 2.75));
+    const double truth_y = random.Uniform(1.25, 2.75), truth_x = random.Uniform(1.5, 3.5);
+    const Eigen::Vector2d truth(truth_x, truth_y);
     const double heading = random.UniformInt(0, 3) * std::numbers::pi / 2;
     auto seen = survey.room.SeenLandmarks(VisualRoom::PoseAt(truth, heading));
-    for (SeenLandmark& match : seen)
-      match.seen += Eigen::Vector3d(random.Normal(0, noise_px), random.Normal(0, noise_px), 0);
+    for (SeenLandmark& match : seen) {
+      const double y = random.Normal(0, noise_px), x = random.Normal(0, noise_px);
+      match.seen += Eigen::Vector3d(x, y, 0);
+    }
     const auto pose = EstimateVisualPose(*survey.visual, seen, options);
     const auto lattice = PosteriorOnLattice(*survey.visual, seen, options);
     if (!pose.ok() || !lattice.ok()) continue;
