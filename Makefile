@@ -28,7 +28,7 @@ PACKAGES_TEST := $(PACKAGES_MORE) $(LIBRARIES_TEST) sqlite3 ffmpeg \
     python3-rosbag python3-nav-msgs python3-tf2-msgs \
     debhelper dh-python lintian debootstrap clang libclang-rt-14-dev clang-format clang-tidy
 # Another architecture: its compiler, an emulator, and what fetches its packages.
-PACKAGES_CROSS := g++-aarch64-linux-gnu qemu-user-static mmdebstrap
+PACKAGES_CROSS := g++-aarch64-linux-gnu qemu-user-static mmdebstrap fakechroot
 # Optional: the demo's picture as PNG; for tests of the kernels of other processors, an emulation of Intel's instructions and
 # what 64-bit ARM needs.
 PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev $(PACKAGES_CROSS)
