@@ -96,6 +96,9 @@ inline constexpr int kMapVersionMinor = 7;
 // The major version that maps with other descriptors than SIFT's state, so that programs which know those
 // alone refuse them; all else is as in kMapVersionMajor.
 inline constexpr int kMapVersionOfKinds = 3;
+inline int MapVersionMajor(const DescriptorKind& kind) {
+  return kind.is_sift() ? kMapVersionMajor : kMapVersionOfKinds;
+}
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

@@ -42,6 +42,7 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
     CAIRN_ASSIGN_OR_RETURN(const auto cameras, ReadDatabaseCameras(database));
     CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images,
                            ReadImages(path, part.is_cut(), database));
+    const bool replaces_files = HasDescriptorKind(database);
     std::map<std::string, FeaturesRow> rows;
     for (const DatabaseImage& image : images) {
       const auto camera = cameras.find(image.camera_id);
@@ -49,8 +50,7 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
         return MakeError(ErrorCode::kCorrupt, "{}: image '{}' has camera {}, which is not in it", path,
                          image.name, image.camera_id);
       }
-      rows.emplace(prefix + image.name,
-                   FeaturesRow{path, image.image_id, camera->second, HasDescriptorKind(database)});
+      rows.emplace(prefix + image.name, FeaturesRow{path, image.image_id, camera->second, replaces_files});
     }
     if (!HasTable(database, "cairn_landmark_images")) return rows;
     std::set<int64_t> of_landmarks;
@@ -138,8 +138,13 @@ Result<const FeaturesRow*> CaptureFeatures::Find(const std::string& name) {
 }
 
 bool CaptureFeatures::ReplacesFiles(const std::string& name) {
-  const auto rows = List(SessionOf(name));
-  return rows.ok() && !(*rows)->empty() && (*rows)->begin()->second.replaces_file;
+  const std::string session = SessionOf(name);
+  const auto [known, is_new] = replace_files_.try_emplace(session, false);
+  if (is_new) {
+    const auto rows = List(session);
+    known->second = rows.ok() && !(*rows)->empty() && (*rows)->begin()->second.replaces_file;
+  }
+  return known->second;
 }
 
 Result<Features> ReadCaptureFeatures(const FeaturesRow& row, const Camera& camera) {

@@ -59,6 +59,7 @@ class CaptureFeatures {
 
   std::string root_;
   std::map<std::string, std::map<std::string, FeaturesRow>> read_;  // by session
+  std::map<std::string, bool> replace_files_;  // by session; one that cannot be read does not
 };
 
 // Reads an image's features and checks them.  Errors, each with the file: those of OpenColmapDatabase and its

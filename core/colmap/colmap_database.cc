@@ -161,6 +161,11 @@ Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database
   return images;
 }
 
+Keypoint KeypointOfShape(float x, float y, const float* shape) {
+  return {x, y, 0.5f * (std::hypot(shape[0], shape[2]) + std::hypot(shape[1], shape[3])),
+          std::atan2(shape[2], shape[0])};
+}
+
 Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id) {
   SQLite::Statement query(database, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
   query.bind(1, image_id);
@@ -179,10 +184,7 @@ Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, 
     std::memcpy(v, blob.data() + i * columns * sizeof(float), columns * sizeof(float));
     Keypoint& keypoint = keypoints[i];
     keypoint = {v[0], v[1], v[2], v[3]};
-    if (columns == 6) {
-      keypoint.scale = 0.5f * (std::hypot(v[2], v[4]) + std::hypot(v[3], v[5]));
-      keypoint.orientation = std::atan2(v[4], v[2]);
-    }
+    if (columns == 6) keypoint = KeypointOfShape(v[0], v[1], v + 2);
     if (!std::isfinite(keypoint.x) || !std::isfinite(keypoint.y) || !std::isfinite(keypoint.scale) ||
         !std::isfinite(keypoint.orientation)) {
       return BadRow(database, "keypoints", image_id, fmt::format("keypoint {} is not finite", i));

@@ -71,6 +71,8 @@ void CopyColmapDatabase(SQLite::Database& source, const std::string& copy_path);
 // They throw SQLite::Exception: call them inside WithDatabaseErrors.
 Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& database);
 Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database);  // ascending image_id
+// A keypoint of an affine shape a11 a12 a21 a22, as COLMAP's FeatureKeypoint has its scale and orientation.
+Keypoint KeypointOfShape(float x, float y, const float* shape);
 Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
 // Of this kind, which the database says (ReadDescriptorKind).
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,

@@ -86,15 +86,14 @@ class ColmapFeatures : public FeatureReader {
  private:
   // Descriptors from their bytes.
   Status Unfold(const std::string& name, Features* features) const {
-    const DescriptorMatrix bytes = std::move(features->descriptors);
-    if (features->kind.type == DescriptorType::kBinary) {
-      features->descriptors = DescriptorsFromBits(bytes.data(), bytes.rows(), bytes.cols(), features->kind);
-      return Ok();
+    const DescriptorMatrix& bytes = features->descriptors;
+    NumberTable table{.type = NumberType::kUInt8, .num_rows = bytes.rows(), .num_cols = bytes.cols()};
+    if (features->kind.type != DescriptorType::kBinary) {
+      table.type = NumberType::kFloat32;
+      table.num_cols = features->kind.num_values;
     }
-    NumberTable table{
-        .type = NumberType::kFloat32, .num_rows = bytes.rows(), .num_cols = features->kind.num_values};
     table.bytes.assign(reinterpret_cast<const char*>(bytes.data()), static_cast<size_t>(bytes.size()));
-    Result<DescriptorMatrix> descriptors = DescriptorsFromFloats(Floats(table), features->kind);
+    Result<DescriptorMatrix> descriptors = DescriptorsOf(table, features->kind);
     if (!descriptors.ok())
       return MakeError(ErrorCode::kCorrupt, "{}: image {}: {}", path_, name, descriptors.error().message);
     features->descriptors = std::move(*descriptors);

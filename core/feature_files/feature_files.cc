@@ -2,16 +2,9 @@
 
 #include <filesystem>
 
-#include "core/files/file.h"
-
 namespace cairn {
 
 namespace fs = std::filesystem;
-
-bool IsPathBelow(const std::string& name) {
-  const fs::path path(name);
-  return !name.empty() && path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
-}
 
 Result<FeatureFiles> FeatureFiles::Open(const std::string& path, const std::string& descriptors) {
   CAIRN_ASSIGN_OR_RETURN(const DescriptorChoice choice, ParseDescriptorChoice(descriptors));
@@ -23,16 +16,20 @@ Result<FeatureFiles> FeatureFiles::Open(const std::string& path, const std::stri
         "files",
         path);
   }
-  FeatureFiles files;
   const std::string of_capture = path + "/features.db";
   if (fs::exists(of_capture, error)) return Open(of_capture, descriptors);
+  FeatureFiles files;
   Result<std::unique_ptr<FeatureReader>> reader = [&] {
     if (!fs::is_directory(path, error)) {
       files.layout_ = "COLMAP database";
       return OpenColmapFeatures(path);
     }
-    files.layout_ = IsKaptureWithFeatures(path) ? "kapture folder" : "folder of .npz files";
-    return IsKaptureWithFeatures(path) ? OpenKaptureFeatures(path) : OpenNpzFeatures(path);
+    if (IsKaptureWithFeatures(path)) {
+      files.layout_ = "kapture folder";
+      return OpenKaptureFeatures(path);
+    }
+    files.layout_ = "folder of .npz files";
+    return OpenNpzFeatures(path);
   }();
   if (!reader.ok()) return reader.error();
   files.reader_ = std::move(*reader);

@@ -53,7 +53,5 @@ Result<std::unique_ptr<FeatureReader>> OpenKaptureFeatures(const std::string& pa
 Result<std::unique_ptr<FeatureReader>> OpenNpzFeatures(const std::string& path);
 // What makes a folder one of kapture's.
 bool IsKaptureWithFeatures(const std::string& path);
-// Whether a name may be a path below a folder: relative, without "..".
-bool IsPathBelow(const std::string& name);
 
 }  // namespace cairn

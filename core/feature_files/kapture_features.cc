@@ -8,6 +8,7 @@
 #include "core/base/text.h"
 #include "core/feature_files/feature_files.h"
 #include "core/files/file.h"
+#include "core/files/input_file.h"
 
 namespace cairn {
 namespace {

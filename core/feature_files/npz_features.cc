@@ -1,9 +1,11 @@
 // Folders of .npz files.
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "core/feature_files/feature_files.h"
 #include "core/feature_files/npz_file.h"
+#include "core/files/input_file.h"
 
 namespace cairn {
 namespace {
@@ -20,15 +22,7 @@ NumberTable WithRows(NumberTable table, int64_t num_keypoints, bool are_columns)
   const bool is_square = table.num_rows == table.num_cols;
   const bool turns =
       is_square ? are_columns : table.num_cols == num_keypoints && table.num_rows != num_keypoints;
-  if (!turns) return table;
-  const int size = BytesOf(table.type);
-  std::string rows(table.bytes.size(), '\0');
-  for (int64_t row = 0; row < table.num_cols; ++row) {
-    for (int64_t col = 0; col < table.num_rows; ++col)
-      table.bytes.copy(rows.data() + (row * table.num_rows + col) * size, size,
-                       (col * table.num_cols + row) * size);
-  }
-  return {table.type, table.num_cols, table.num_rows, std::move(rows)};
+  return turns ? Transposed(table) : std::move(table);
 }
 
 struct NpzArrays {

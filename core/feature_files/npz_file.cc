@@ -2,9 +2,9 @@
 
 #include <zip.h>
 
-#include <cstring>
 #include <memory>
 #include <regex>
+#include <utility>
 
 #include "core/base/text.h"
 #include "core/files/input_file.h"
@@ -77,18 +77,6 @@ std::optional<Header> ParseHeader(const std::string& text) {
   return header;
 }
 
-// Rows one after the other, of columns one after the other.
-std::string Transposed(const NumberTable& table) {
-  const int size = BytesOf(table.type);
-  std::string rows(table.bytes.size(), '\0');
-  for (int64_t row = 0; row < table.num_rows; ++row) {
-    for (int64_t col = 0; col < table.num_cols; ++col)
-      std::memcpy(rows.data() + (row * table.num_cols + col) * size,
-                  table.bytes.data() + (col * table.num_rows + row) * size, size);
-  }
-  return rows;
-}
-
 }  // namespace
 
 Result<std::optional<NumberTable>> ReadNpzArray(const std::string& path, const std::string& name) {
@@ -123,7 +111,10 @@ Result<std::optional<NumberTable>> ReadNpzArray(const std::string& path, const s
     return MakeError(ErrorCode::kCorrupt, "{}: {}: {} bytes for {} x {} numbers of type {}", path, entry,
                      table.bytes.size(), table.num_rows, table.num_cols, header->type);
   }
-  if (header->is_by_columns) table.bytes = Transposed(table);
+  if (header->is_by_columns) {  // its columns, one after the other, are rows
+    std::swap(table.num_rows, table.num_cols);
+    table = Transposed(table);
+  }
   return std::optional<NumberTable>(std::move(table));
 }
 

@@ -1,11 +1,10 @@
 #include "core/feature_files/raw_features.h"
 
-#include <cmath>
 #include <cstring>
 
 #include "core/base/printable.h"
 #include "core/base/text.h"
-#include "core/features/features.h"
+#include "core/colmap/colmap_database.h"
 
 namespace cairn {
 namespace {
@@ -22,11 +21,7 @@ Keypoint KeypointOf(const FloatTable& table, Eigen::Index row, float shift_px) {
   const Eigen::Index columns = table.cols();
   if (columns == 3 || columns == 4) keypoint.scale = table(row, 2);
   if (columns == 4) keypoint.orientation = table(row, 3);
-  if (columns == 6) {
-    keypoint.scale =
-        0.5F * (std::hypot(table(row, 2), table(row, 4)) + std::hypot(table(row, 3), table(row, 5)));
-    keypoint.orientation = std::atan2(table(row, 4), table(row, 2));
-  }
+  if (columns == 6) return KeypointOfShape(keypoint.x, keypoint.y, &table(row, 2));
   return keypoint;
 }
 
@@ -60,6 +55,17 @@ std::optional<NumberType> NumberTypeOf(std::string_view name) {
   if (name == "float64" || name == "float" || name == "f8") return NumberType::kFloat64;
   if (name == "uint8" || name == "u1") return NumberType::kUInt8;
   return std::nullopt;
+}
+
+NumberTable Transposed(const NumberTable& table) {
+  const int size = BytesOf(table.type);
+  NumberTable turned{table.type, table.num_cols, table.num_rows, std::string(table.bytes.size(), '\0')};
+  for (int64_t row = 0; row < table.num_rows; ++row) {
+    for (int64_t col = 0; col < table.num_cols; ++col)
+      std::memcpy(turned.bytes.data() + (col * table.num_rows + row) * size,
+                  table.bytes.data() + (row * table.num_cols + col) * size, size);
+  }
+  return turned;
 }
 
 FloatTable Floats(const NumberTable& table) {
@@ -131,6 +137,18 @@ Result<DescriptorKind> KindOf(const NumberTable& descriptors, const DescriptorCh
   return kind;
 }
 
+Result<DescriptorMatrix> DescriptorsOf(const NumberTable& table, const DescriptorKind& kind) {
+  const bool are_numbers = kind.type == DescriptorType::kFloat || kind.type == DescriptorType::kDense;
+  if (!are_numbers && table.type != NumberType::kUInt8)
+    return MakeError(ErrorCode::kCorrupt, "{}; expected bytes", Said(table));
+  Result<DescriptorMatrix> descriptors =
+      are_numbers ? DescriptorsFromFloats(Floats(table), kind)
+                  : DescriptorsFromBytes(reinterpret_cast<const uint8_t*>(table.bytes.data()), table.num_rows,
+                                         table.num_cols, kind);
+  if (!descriptors.ok()) return MakeError(ErrorCode::kCorrupt, "{}", descriptors.error().message);
+  return descriptors;
+}
+
 Result<Features> FeaturesFromRaw(const RawFeatures& raw, const DescriptorKind& kind, float shift_px) {
   const FloatTable& table = raw.keypoints;
   const int64_t columns = table.cols();
@@ -146,19 +164,7 @@ Result<Features> FeaturesFromRaw(const RawFeatures& raw, const DescriptorKind& k
     features.keypoints.push_back(KeypointOf(table, i, shift_px));
   }
   if (table.rows() == 0) return features;
-  if (kind.type != DescriptorType::kSift && kind.type != DescriptorType::kBinary) {
-    Result<DescriptorMatrix> descriptors = DescriptorsFromFloats(Floats(raw.descriptors), kind);
-    if (!descriptors.ok()) return MakeError(ErrorCode::kCorrupt, "{}", descriptors.error().message);
-    features.descriptors = std::move(*descriptors);
-    return features;
-  }
-  if (raw.descriptors.type != NumberType::kUInt8)
-    return MakeError(ErrorCode::kCorrupt, "{}; expected bytes", Said(raw.descriptors));
-  Result<DescriptorMatrix> descriptors =
-      DescriptorsFromBytes(reinterpret_cast<const uint8_t*>(raw.descriptors.bytes.data()), table.rows(),
-                           raw.descriptors.num_cols, kind);
-  if (!descriptors.ok()) return MakeError(ErrorCode::kCorrupt, "{}", descriptors.error().message);
-  features.descriptors = std::move(*descriptors);
+  CAIRN_ASSIGN_OR_RETURN(features.descriptors, DescriptorsOf(raw.descriptors, kind));
   return features;
 }
 

@@ -23,8 +23,9 @@ struct NumberTable {
   int64_t num_cols = 0;
   std::string bytes;
 };
-using FloatTable = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using FloatTable = FloatDescriptors;  // keypoints, too
 FloatTable Floats(const NumberTable& table);
+NumberTable Transposed(const NumberTable& table);
 
 // Features of an image as a file has them.
 struct RawFeatures {
@@ -45,6 +46,9 @@ Result<DescriptorChoice> ParseDescriptorChoice(std::string_view text);
 
 // The kind of descriptors in a table.  Errors: Unsupported (says what was found, and what to do).
 Result<DescriptorKind> KindOf(const NumberTable& descriptors, const DescriptorChoice& choice);
+
+// In the form of their kind.  Errors: as FeaturesFromRaw.
+Result<DescriptorMatrix> DescriptorsOf(const NumberTable& table, const DescriptorKind& kind);
 
 // Keypoints moved by `shift_px` in x and y, descriptors in the form of their kind.  Errors: Corrupt (numbers
 // that do not fit, or are not finite), Unsupported.

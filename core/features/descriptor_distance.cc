@@ -28,7 +28,7 @@ CAIRN_WIDE_CLONES int32_t CentredDot(const uint8_t* a, const uint8_t* b, int num
 }  // namespace
 
 int32_t DescriptorDot(const uint8_t* a, const uint8_t* b, const DescriptorSpace& space) {
-  if (space.num_values == kSiftDescriptorDim && space.offset == 0) return SiftDot(a, b);
+  if (space.is_sift()) return SiftDot(a, b);
   return CentredDot(a, b, space.num_values, space.offset);
 }
 

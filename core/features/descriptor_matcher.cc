@@ -154,9 +154,8 @@ void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors&
   columns->assign(descriptors2.size(), {});
   const BestTwoKernel& kernel = KernelForAll(descriptors1.kernel());
   const DescriptorSpace& of = descriptors1.space();
-  const SweepSpace space{.num_chunks = NumChunks(of),
-                         .offset = static_cast<uint32_t>(of.offset),
-                         .has_terms = of != DescriptorSpace()};
+  const SweepSpace space{
+      .num_chunks = NumChunks(of), .offset = static_cast<uint32_t>(of.offset), .has_terms = !of.is_sift()};
   if (const BestTwoKernel* for_small = KernelForSmall(descriptors1.kernel()))
     SweepBlocks(descriptors1.small(), descriptors2.small(), *for_small, space, &scratch, rows, columns);
   SweepBlocks(descriptors1.small(), descriptors2.other(), kernel, space, &scratch, rows, columns);

@@ -42,6 +42,9 @@ struct DescriptorSpace {
   int offset = 0;  // the value that stands for 0
   DescriptorMeasure measure = DescriptorMeasure::kAngle;
   double squared_norm = 512.0 * 512.0;  // of every vector, up to rounding
+
+  // RootSIFT's, which has kernels of its own: no other has no offset.
+  bool is_sift() const { return offset == 0 && num_values == kSiftDescriptorDim; }
   friend bool operator==(const DescriptorSpace&, const DescriptorSpace&) = default;
 };
 
@@ -52,8 +55,7 @@ enum class DescriptorType {
   // Values of any detector that are compared by their angle: DescriptorsFromFloats.
   kFloat,
   // Values of a net that describes all of an image, from which some places are taken: those beside a place
-  // look
-  // like it, so that the second best says little about the best.
+  // look like it, so that the second best says little about the best.
   kDense,
   // Bits, each 0 or twice the offset.
   kBinary,
@@ -78,9 +80,9 @@ struct DescriptorKind {
 using FloatDescriptors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 Result<DescriptorMatrix> DescriptorsFromFloats(const FloatDescriptors& values, const DescriptorKind& kind);
 
-// Descriptors of bits, eight a byte, the lowest bit of a byte first: row i of `bytes` begins at i *
-// num_bytes. A bit takes a byte then: products of bytes are what processors are fast at. REQUIRES: 8 *
-// num_bytes == kind.num_values
+// Descriptors of bits, eight a byte, the lowest bit of a byte first: row i of `bytes` begins at
+// i * num_bytes.  A bit takes a byte then: products of bytes are what processors are fast at.
+// REQUIRES: 8 * num_bytes == kind.num_values
 DescriptorMatrix DescriptorsFromBits(const uint8_t* bytes, int64_t num_rows, int64_t num_bytes,
                                      const DescriptorKind& kind);
 // Descriptors of bytes as they come from an extractor: SIFT's 128, or the bits of a binary kind.

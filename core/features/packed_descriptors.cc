@@ -72,12 +72,10 @@ void SetPartialBias(const PackedValues& values, const BestTwoKernel& kernel, uin
     bias[i * kernel.lanes] = ((sums[2 * i] - 32768) & 0xFFFF) | ((sums[2 * i + 1] - 32768) & 0xFFFF) << 16;
 }
 
-bool IsSift(const DescriptorSpace& space) { return space == DescriptorSpace(); }
-
 // The values of a descriptor in the order in which they are packed; after others than SIFT's, some that stand
 // for 0.
 void PackValues(const uint8_t* descriptor, const DescriptorSpace& space, PackedValues* packed) {
-  if (IsSift(space)) {
+  if (space.is_sift()) {
     const SiftValues values = Reorder(descriptor);
     std::copy(values.begin(), values.end(), packed->begin());
   } else {
@@ -92,7 +90,7 @@ void Pack(const DescriptorMatrix& descriptors, const DescriptorSpace& space, con
   block->num_groups = (num + lanes - 1) / lanes;
   block->words.Resize(static_cast<int64_t>(block->num_groups) * num_chunks * lanes);
   block->bias.Resize(static_cast<int64_t>(block->num_groups) * kernel.num_bias * lanes);
-  if (!IsSift(space)) block->terms.Resize(static_cast<int64_t>(block->num_groups) * lanes);
+  if (!space.is_sift()) block->terms.Resize(static_cast<int64_t>(block->num_groups) * lanes);
   PackedValues values;
   values.fill(static_cast<uint8_t>(space.offset));
   for (int i = 0; i < block->num_groups * lanes; ++i) {
@@ -121,7 +119,7 @@ void Pack(const DescriptorMatrix& descriptors, const DescriptorSpace& space, con
       if (kernel.num_bias == 1) *bias = kernel.row_offset * sum;
       if (kernel.num_bias > 1) SetPartialBias(values, kernel, bias);
     }
-    if (!IsSift(space)) block->terms.data()[i] = space.offset * sum;
+    if (!space.is_sift()) block->terms.data()[i] = space.offset * sum;
   }
 }
 
@@ -198,7 +196,7 @@ const BestTwoKernel* KernelForSmall(MatchKernel kernel) {
 PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, const DescriptorSpace& space,
                                      MatchKernel kernel)
     : kernel_(kernel), space_(space) {
-  const BestTwoKernel* for_small = IsSift(space) ? KernelForSmall(kernel) : nullptr;
+  const BestTwoKernel* for_small = space.is_sift() ? KernelForSmall(kernel) : nullptr;
   for (int32_t i = 0; i < descriptors.rows(); ++i) {
     const bool is_small = for_small != nullptr && FitsIn16Bits(Reorder(descriptors.row(i).data()));
     (is_small ? small_ : other_).idx.push_back(i);

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
-#include <opencv2/imgproc.hpp>
-
+#include "core/features/smaller_image.h"
 #include "core/sift/find_sift.h"
 
 namespace cairn {
@@ -17,11 +17,6 @@ static_assert(kSiftDim == kSiftDescriptorDim);
 
 // Least scale of octave 1: half a layer above its level 0.
 constexpr double kOctaveOneScalePx = 1.7959392773;  // 1.6 * 2^(1/6)
-
-// Of an image that is made smaller before; at most 1.
-double SmallerRatio(cv::Size image, const SiftOptions& options) {
-  return std::min(1.0, static_cast<double>(options.max_image_side_px) / std::max(image.width, image.height));
-}
 
 using IsWanted = std::function<bool(const Keypoint&)>;
 
@@ -50,36 +45,17 @@ Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat&
   return features;
 }
 
-// The same of an image that is made smaller by SmallerRatio, in the pixels of the whole one.  With pixels
-// counted from the image's corner, a position in one is a multiple of that in the other.
+// The same of an image that is made smaller where it is too large, in the pixels of the whole one.
 Features ExtractFromSmaller(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask,
                             const SiftSearch& search, const IsWanted& is_wanted) {
-  const double ratio = SmallerRatio(grey.size(), options);
-  if (ratio == 1) return Extract(grey, options, mask, search, is_wanted);
-  const cv::Size size(std::max(1, cvRound(ratio * grey.cols)), std::max(1, cvRound(ratio * grey.rows)));
-  cv::Mat small, small_mask;
-  cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
-  if (!mask.empty()) cv::resize(mask, small_mask, size, 0, 0, cv::INTER_NEAREST);
-  const float x_scale = static_cast<float>(grey.cols) / static_cast<float>(size.width);
-  const float y_scale = static_cast<float>(grey.rows) / static_cast<float>(size.height);
-  const auto larger = [&](Keypoint keypoint) {
-    keypoint.x *= x_scale;
-    keypoint.y *= y_scale;
-    keypoint.scale *= std::sqrt(x_scale * y_scale);
-    return keypoint;
-  };
+  const std::optional<SmallerImage> smaller = MakeSmaller(grey, mask, options.max_image_side_px);
+  if (!smaller) return Extract(grey, options, mask, search, is_wanted);
   IsWanted is_small_wanted;
-  if (is_wanted) is_small_wanted = [&](const Keypoint& keypoint) { return is_wanted(larger(keypoint)); };
-  Features features = Extract(small, options, small_mask, search, is_small_wanted);
-  for (Keypoint& keypoint : features.keypoints) keypoint = larger(keypoint);
+  if (is_wanted)
+    is_small_wanted = [&](const Keypoint& keypoint) { return is_wanted(smaller->Larger(keypoint)); };
+  Features features = Extract(smaller->grey, options, smaller->mask, search, is_small_wanted);
+  for (Keypoint& keypoint : features.keypoints) keypoint = smaller->Larger(keypoint);
   return features;
-}
-
-Status CheckGrey(const cv::Mat& grey) {
-  if (!grey.empty() && grey.type() == CV_8UC1) return Ok();
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "SIFT needs an 8-bit grey image, found {} x {} of OpenCV type {}", grey.cols, grey.rows,
-                   grey.type());
 }
 
 }  // namespace
@@ -118,26 +94,23 @@ Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg) {
 }
 
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask) {
-  CAIRN_RETURN_IF_ERROR(CheckGrey(grey));
-  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
-    return MakeError(ErrorCode::kInvalidArgument, "a mask of {} x {} px does not fit the image of {} x {} px",
-                     mask.cols, mask.rows, grey.cols, grey.rows);
-  }
+  CAIRN_RETURN_IF_ERROR(CheckGreyImage(grey, "SIFT"));
+  CAIRN_RETURN_IF_ERROR(CheckMask(mask, grey));
   return ExtractFromSmaller(grey, options, mask, {}, {});
 }
 
 int64_t NumSiftPixels(cv::Size image, const SiftOptions& options) {
-  const double ratio = SmallerRatio(image, options);
+  const double ratio = SmallerRatio(image, options.max_image_side_px);
   return std::llround(ratio * ratio * image.width * image.height);
 }
 
 double CoarseSiftScalePx(cv::Size image, const SiftOptions& options) {
-  return kOctaveOneScalePx / SmallerRatio(image, options);
+  return kOctaveOneScalePx / SmallerRatio(image, options.max_image_side_px);
 }
 
 Result<Features> ExtractUndoubledSift(const cv::Mat& grey, const SiftOptions& options, SiftScales scales,
                                       const std::function<bool(const Keypoint&)>& is_wanted) {
-  CAIRN_RETURN_IF_ERROR(CheckGrey(grey));
+  CAIRN_RETURN_IF_ERROR(CheckGreyImage(grey, "SIFT"));
   SiftSearch search{.doubled = false};
   if (scales == SiftScales::kCoarse) search.first_octave = 1;
   if (scales == SiftScales::kFine) search.end_octave = 1;

@@ -1,5 +1,6 @@
 #include "core/files/input_file.h"
 
+#include <algorithm>
 #include <filesystem>
 
 namespace cairn {
@@ -40,6 +41,11 @@ Status CheckInputFile(const std::string& path) {
                        "{}: is {}, expected a file; save its contents to a file first", path,
                        KindText(status.type()));
   }
+}
+
+bool IsPathBelow(const std::string& name) {
+  const fs::path path(name);
+  return !name.empty() && path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
 }
 
 }  // namespace cairn

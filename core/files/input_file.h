@@ -11,4 +11,7 @@ namespace cairn {
 // (nothing there, or a folder), InvalidArgument (a pipe, a socket or a device), Io; each says what was found.
 Status CheckInputFile(const std::string& path);
 
+// Whether a name that comes from a list may be a path below a folder: relative, and no way out of it.
+bool IsPathBelow(const std::string& name);
+
 }  // namespace cairn

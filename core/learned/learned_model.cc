@@ -14,6 +14,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/base/text.h"
+#include "core/features/smaller_image.h"
 #include "core/files/file.h"
 #include "core/files/input_file.h"
 #include "core/learned/dense_heads.h"
@@ -105,19 +106,6 @@ std::optional<std::array<int, kNumHeads>> FindHeads(const std::vector<cv::Mat>& 
     heads[head] = i;
   }
   return heads;
-}
-
-Status CheckImage(const cv::Mat& grey, const cv::Mat& mask) {
-  if (grey.empty() || grey.type() != CV_8UC1) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "a learned model needs an 8-bit grey image, found {} x {} of OpenCV type {}", grey.cols,
-                     grey.rows, grey.type());
-  }
-  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
-    return MakeError(ErrorCode::kInvalidArgument, "a mask of {} x {} px does not fit the image of {} x {} px",
-                     mask.cols, mask.rows, grey.cols, grey.rows);
-  }
-  return Ok();
 }
 
 // The best, in their former order.
@@ -298,20 +286,12 @@ Result<LearnedModel> LearnedModel::Open(const std::string& path) {
 
 Result<LearnedFeatures> LearnedModel::Extract(const cv::Mat& grey, const LearnedOptions& options,
                                               const cv::Mat& mask) {
-  CAIRN_RETURN_IF_ERROR(CheckImage(grey, mask));
-  const double ratio =
-      std::min(1.0, static_cast<double>(options.max_image_side_px) / std::max(grey.cols, grey.rows));
-  if (ratio == 1) return net_->Extract(grey, options, mask);
-  // With pixels counted from the image's corner, a position in one is a multiple of that in the other.
-  const cv::Size size(std::max(1, cvRound(ratio * grey.cols)), std::max(1, cvRound(ratio * grey.rows)));
-  cv::Mat small, small_mask;
-  cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
-  if (!mask.empty()) cv::resize(mask, small_mask, size, 0, 0, cv::INTER_NEAREST);
-  CAIRN_ASSIGN_OR_RETURN(LearnedFeatures features, net_->Extract(small, options, small_mask));
-  for (Keypoint& keypoint : features.keypoints) {
-    keypoint.x *= static_cast<float>(grey.cols) / static_cast<float>(size.width);
-    keypoint.y *= static_cast<float>(grey.rows) / static_cast<float>(size.height);
-  }
+  CAIRN_RETURN_IF_ERROR(CheckGreyImage(grey, "a learned model"));
+  CAIRN_RETURN_IF_ERROR(CheckMask(mask, grey));
+  const std::optional<SmallerImage> smaller = MakeSmaller(grey, mask, options.max_image_side_px);
+  if (!smaller) return net_->Extract(grey, options, mask);
+  CAIRN_ASSIGN_OR_RETURN(LearnedFeatures features, net_->Extract(smaller->grey, options, smaller->mask));
+  for (Keypoint& keypoint : features.keypoints) keypoint = smaller->Larger(keypoint);
   return features;
 }
 

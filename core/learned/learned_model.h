@@ -27,7 +27,7 @@ struct LearnedOptions {
 // The features of one image, row i of `descriptors` belonging to keypoint i.
 struct LearnedFeatures {
   std::vector<Keypoint> keypoints;  // scale and orientation are 0: they are not measured
-  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> descriptors;  // of norm 1
+  FloatDescriptors descriptors;     // of norm 1
 };
 
 // A net that finds features in a grey image, from an ONNX file, with the outputs of XFeat [Potje24 §3.2]

@@ -94,7 +94,7 @@ int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descri
                   const DescriptorSpace& space) {
 #if defined(__x86_64__) && defined(__GNUC__)
   static const bool has_avx2 = __builtin_cpu_supports("avx2") != 0;
-  if (has_avx2 && space == DescriptorSpace()) return NearestCentreAvx2(centres, num_centres, descriptor);
+  if (has_avx2 && space.is_sift()) return NearestCentreAvx2(centres, num_centres, descriptor);
 #endif
   return NearestCentrePortable(centres, num_centres, descriptor, space);
 }

@@ -159,8 +159,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
   for (const MapRegion& region : rows.regions) num_region_landmarks += region.landmarks.size();
   nlohmann::ordered_json json = {
       {"name", rows.name},
-      {"format", fmt::format("{}.{}", rows.descriptor_kind.is_sift() ? kMapVersionMajor : kMapVersionOfKinds,
-                             file.minor_version())},
+      {"format", fmt::format("{}.{}", MapVersionMajor(rows.descriptor_kind), file.minor_version())},
       {"descriptors", ToString(rows.descriptor_kind)},
       {"writer", rows.writer},
       {"instruction_set", rows.instruction_set},

@@ -212,36 +212,26 @@ Answer LocalizeImage(const Asked& asked, const std::shared_ptr<const Map>& map, 
   return answer;
 }
 
-// By features that another program found.
-Answer LocalizeGiven(const Asked& asked, const GivenFeatures& given, const std::shared_ptr<const Map>& map,
-                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
+// By features that another program found, or that a model finds: one of the two.
+Answer LocalizeByFeatures(const Asked& asked, const GivenFeatures* given, const FeatureFinder* finder,
+                          const std::shared_ptr<const Map>& map, const CameraChoice& cameras,
+                          const LocalizeArguments& arguments) {
   Answer answer{.image = asked.image};
   answer.localization = [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(Features features, given.Find(asked.image));
-    CAIRN_ASSIGN_OR_RETURN(const Camera camera, given.CameraOf(asked.image, cameras, map->head()));
+    Features features;
+    Camera camera;
+    if (given != nullptr) {
+      CAIRN_ASSIGN_OR_RETURN(features, given->Find(asked.image));
+      CAIRN_ASSIGN_OR_RETURN(camera, given->CameraOf(asked.image, cameras, map->head()));
+    } else {
+      CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
+      CAIRN_ASSIGN_OR_RETURN(camera, cameras.ForImage(grey.cols, grey.rows));
+      CAIRN_ASSIGN_OR_RETURN(features, finder->Find(grey));
+    }
     answer.camera_id = camera.camera_id;
     CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
-    answer.seconds = -ThreadSeconds();
     return Localizer(map, arguments.options).LocalizeFeatures(std::move(features), camera, std::nullopt, up);
   }();
-  answer.seconds += ThreadSeconds();
-  return answer;
-}
-
-// By features that a model finds.
-Answer LocalizeByModel(const Asked& asked, const FeatureFinder& finder, const std::shared_ptr<const Map>& map,
-                       const CameraChoice& cameras, const LocalizeArguments& arguments) {
-  Answer answer{.image = asked.image};
-  answer.localization = [&]() -> Result<Localization> {
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(asked.image));
-    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
-    answer.camera_id = camera.camera_id;
-    CAIRN_ASSIGN_OR_RETURN(const std::optional<SensedUp> up, asked.up);
-    answer.seconds = -ThreadSeconds();
-    CAIRN_ASSIGN_OR_RETURN(Features features, finder.Find(grey));
-    return Localizer(map, arguments.options).LocalizeFeatures(std::move(features), camera, std::nullopt, up);
-  }();
-  answer.seconds += ThreadSeconds();
   return answer;
 }
 
@@ -385,10 +375,10 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
     }
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
-      answers[i] = visual         ? LocateByViews(asked[i], map, *visual, cameras, arguments, &trackers)
-                   : given        ? LocalizeGiven(asked[i], *given, map, cameras, arguments)
-                   : finder       ? LocalizeByModel(asked[i], *finder, map, cameras, arguments)
-                   : !rig.empty() ? LocalizeRigImages(asked[i], rig, map, cameras, arguments)
+      answers[i] = visual            ? LocateByViews(asked[i], map, *visual, cameras, arguments, &trackers)
+                   : given || finder ? LocalizeByFeatures(asked[i], given ? &*given : nullptr, finder.get(),
+                                                          map, cameras, arguments)
+                   : !rig.empty()    ? LocalizeRigImages(asked[i], rig, map, cameras, arguments)
                    : arguments.is_sequence ? TrackImage(asked[i], map, cameras, arguments, &trackers)
                                            : LocalizeImage(asked[i], map, cameras, arguments);
     });

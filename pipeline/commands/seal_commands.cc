@@ -100,9 +100,8 @@ Status Migrate(const SealArguments& arguments, const CommandEnvironment& environ
   if (!read.ok() && read.error().code == ErrorCode::kTooNew) read = ReadMapRows(arguments.input_path);
   if (!read.ok()) return read.error();
   CAIRN_RETURN_IF_ERROR(WriteMapRows(*read, arguments.output_path));
-  *environment.out << fmt::format(
-      "{}: map '{}' as version {}.{}, not signed\n", arguments.output_path, read->name,
-      read->descriptor_kind.is_sift() ? kMapVersionMajor : kMapVersionOfKinds, kMapVersionMinor);
+  *environment.out << fmt::format("{}: map '{}' as version {}.{}, not signed\n", arguments.output_path,
+                                  read->name, MapVersionMajor(read->descriptor_kind), kMapVersionMinor);
   return Ok();
 }
 

@@ -26,7 +26,7 @@ int32_t LeastDot(double angle_rad, const DescriptorSpace& space) {
       low = middle + 1;
     }
   }
-  return space.offset == 0 ? low : std::max(low, 1);  // of others, what is at a right angle does not count
+  return space.is_sift() ? low : std::max(low, 1);  // of others, what is at a right angle does not count
 }
 
 // All pairs of classes of which one lies within the other's radius.  Classes are compared in the order of

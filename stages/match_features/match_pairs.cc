@@ -69,7 +69,7 @@ ViewForVerification ForVerification(const MatchImages& images, const MatchImage&
           &features.keypoints,
           &features.bearings,
           features.descriptors.rows() > 0 ? &features.descriptors : nullptr,
-          features.space,
+          features.packed.space(),
           image.cam_from_world};
 }
 

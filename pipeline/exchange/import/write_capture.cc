@@ -1,4 +1,5 @@
 #include "pipeline/exchange/import/write_capture.h"
+#include "core/files/input_file.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -34,11 +35,7 @@ Status MarkListed(const std::string& list_path, ImportedSurvey* survey) {
 }
 
 // Names come from the data set's lists: none may lead out of the capture.
-bool StaysBelow(const std::string& name) {
-  const fs::path path(name);
-  return !name.empty() && path.is_relative() && name.find('\n') == std::string::npos &&
-         std::none_of(path.begin(), path.end(), [](const fs::path& part) { return part == ".."; });
-}
+bool StaysBelow(const std::string& name) { return IsPathBelow(name) && name.find('\n') == std::string::npos; }
 
 Status TransferImage(const ImportedImage& image, ImageTransfer transfer, const std::string& folder) {
   if (!StaysBelow(image.name)) {

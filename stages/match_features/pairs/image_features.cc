@@ -88,10 +88,9 @@ Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchI
                                         const Camera& camera, const DescriptorKind& kind,
                                         bool keep_descriptors) {
   ImageFeatures features;
-  features.space = kind.space();
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
-  features.packed = PackedDescriptors(features.descriptors, features.space);
+  features.packed = PackedDescriptors(features.descriptors, kind.space());
   features.bearings = BearingsOf(features.keypoints, camera);
   if (!keep_descriptors) features.descriptors = {};
   return features;

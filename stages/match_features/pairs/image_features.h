@@ -44,8 +44,7 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 struct ImageFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
-  DescriptorSpace space;
-  DescriptorMatrix descriptors;  // for guided matching; without rows where there is none
+  DescriptorMatrix descriptors;           // for guided matching; without rows where there is none
   PackedDescriptors packed;
 
   // Upper limit of the memory that the features of an image take, bytes.
