@@ -142,7 +142,7 @@ struct MapLocalizer::State {
     CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromName(parameters.camera_model));
     camera.width = grey.cols;
     camera.height = grey.rows;
-    camera.params = parameters.camera_params;
+    camera.params.assign(parameters.camera_params.begin(), parameters.camera_params.end());
     return camera;
   }
 

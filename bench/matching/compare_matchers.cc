@@ -14,6 +14,7 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/flann.hpp>
 
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/colmap/colmap_database.h"
 #include "core/features/descriptor_matcher.h"
@@ -30,7 +32,7 @@ namespace {
 
 using Floats = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using FlannIndex = cv::flann::GenericIndex<cvflann::L2<uint8_t>>;
-using Matches = std::vector<Match>;
+using Matches = PooledVector<Match>;
 
 // As COLMAP builds and queries its trees.
 constexpr int kNumFlannTrees = 4;
@@ -53,7 +55,7 @@ double CpuMs() {
 }
 
 // COLMAP's tests of candidates (FindBestMatches in src/feature/matching.cc of 3.8).
-Matches Select(const std::vector<BestTwo>& rows, const std::vector<BestTwo>& columns) {
+Matches Select(std::span<const BestTwo> rows, std::span<const BestTwo> columns) {
   const auto angle = [](int dot) { return std::acos(std::min(dot / (512.0 * 512.0), 1.0)); };
   const auto passes = [&](const BestTwo& b) {
     return b.idx >= 0 && angle(b.best) <= 0.7 && (b.second < 0 || angle(b.best) < 0.8 * angle(b.second));
@@ -79,7 +81,7 @@ void Keep(int idx, int dot, BestTwo* kept) {
 // Products of floats are exact here: sums stay below 2^24.
 Matches ExactMatches(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2) {
   const Floats floats1 = descriptors1.cast<float>(), floats2 = descriptors2.cast<float>();
-  std::vector<BestTwo> rows(floats1.rows()), columns(floats2.rows());
+  PooledVector<BestTwo> rows(floats1.rows()), columns(floats2.rows());
   for (int begin = 0; begin < floats1.rows(); begin += 256) {
     const int num = std::min(256, static_cast<int>(floats1.rows()) - begin);
     const Floats dots = floats1.middleRows(begin, num) * floats2.transpose();
@@ -105,9 +107,9 @@ cv::Mat AsFloats(const DescriptorMatrix& descriptors) {
 }
 
 // The better of the candidates of each query, by dot product as in COLMAP.
-std::vector<BestTwo> BestOf(const DescriptorMatrix& queries, const DescriptorMatrix& searched,
-                            const std::function<int(int, int)>& candidate) {
-  std::vector<BestTwo> best(queries.rows());
+PooledVector<BestTwo> BestOf(const DescriptorMatrix& queries, const DescriptorMatrix& searched,
+                             const std::function<int(int, int)>& candidate) {
+  PooledVector<BestTwo> best(queries.rows());
   for (int i = 0; i < queries.rows(); ++i) {
     for (int k = 0; k < 2; ++k) {
       const int j = candidate(i, k);
@@ -117,7 +119,7 @@ std::vector<BestTwo> BestOf(const DescriptorMatrix& queries, const DescriptorMat
   return best;
 }
 
-std::vector<BestTwo> BruteForce(const DescriptorMatrix& queries, const DescriptorMatrix& searched) {
+PooledVector<BestTwo> BruteForce(const DescriptorMatrix& queries, const DescriptorMatrix& searched) {
   std::vector<std::vector<cv::DMatch>> found;
   cv::BFMatcher(cv::NORM_L2).knnMatch(AsFloats(queries), AsFloats(searched), found, 2);
   return BestOf(queries, searched, [&](int i, int k) { return found[i][k].trainIdx; });
@@ -134,8 +136,8 @@ Matches BruteForceCrossCheck(const DescriptorMatrix& descriptors1, const Descrip
   return matches;
 }
 
-std::vector<BestTwo> SearchFlann(const DescriptorMatrix& queries, const DescriptorMatrix& searched,
-                                 FlannIndex* index) {
+PooledVector<BestTwo> SearchFlann(const DescriptorMatrix& queries, const DescriptorMatrix& searched,
+                                  FlannIndex* index) {
   cv::Mat indices(static_cast<int>(queries.rows()), 2, CV_32S), distances(indices.size(), CV_32F);
   index->knnSearch(AsBytes(queries), indices, distances, 2, cvflann::SearchParams(kNumFlannChecks));
   return BestOf(queries, searched, [&](int i, int k) { return indices.at<int>(i, k); });

@@ -3,6 +3,7 @@
 // included.  No data needed; compare_matchers.sh holds the kernels against their peers.
 #include <benchmark/benchmark.h>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "core/features/descriptor_matcher.h"
 
@@ -30,7 +31,7 @@ void BM_FindBestTwo(benchmark::State& state, MatchKernel kernel) {
   const int num = static_cast<int>(state.range(0));
   const PackedDescriptors descriptors1(RandomDescriptors(num, 1), {}, kernel);
   const PackedDescriptors descriptors2(RandomDescriptors(num, 2), {}, kernel);
-  std::vector<BestTwo> rows, columns;
+  PooledVector<BestTwo> rows, columns;
   for (auto _ : state) {
     FindBestTwo(descriptors1, descriptors2, &rows, &columns);
     benchmark::DoNotOptimize(rows.data());

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 #include "core/colmap/colmap_database.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
@@ -47,7 +48,7 @@ Result<Tables> ReadTables(const std::string& path) {
       ImageFeatures& features = tables.images[image.image_id];
       features.name = image.name;
       features.camera = &tables.cameras.at(image.camera_id);
-      CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+      CAIRN_ASSIGN_OR_RETURN(const PooledVector<Keypoint> keypoints,
                              ReadDatabaseKeypoints(database, image.image_id));
       for (const Keypoint& keypoint : keypoints) {
         const auto ray = CameraFromImage(*features.camera, {keypoint.x, keypoint.y});

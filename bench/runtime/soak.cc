@@ -1,13 +1,9 @@
 // A day of frames: the features of a drive are shown to a tracker back and forth, and every so often from
 // another place, as often as asked.  Fixes, wrong ones, the memory that the process holds in the course of
 // it, and how often a frame asks for some.
-#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cerrno>
-#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -20,46 +16,7 @@
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
 #include "runtime/track/region_tracker.h"
-
-namespace {
-
-std::atomic<long> num_requests{0};
-
-}  // namespace
-
-// glibc's own, counted.
-extern "C" {
-void* __libc_malloc(size_t num_bytes);
-void* __libc_realloc(void* block, size_t num_bytes);
-void* __libc_memalign(size_t alignment, size_t num_bytes);
-void* __libc_calloc(size_t num, size_t num_bytes);
-
-void* malloc(size_t num_bytes) {
-  ++num_requests;
-  return __libc_malloc(num_bytes);
-}
-void* realloc(void* block, size_t num_bytes) {
-  ++num_requests;
-  return __libc_realloc(block, num_bytes);
-}
-void* calloc(size_t num, size_t num_bytes) {
-  ++num_requests;
-  return __libc_calloc(num, num_bytes);
-}
-void* aligned_alloc(size_t alignment, size_t num_bytes) {
-  ++num_requests;
-  return __libc_memalign(alignment, num_bytes);
-}
-int posix_memalign(void** block, size_t alignment, size_t num_bytes) {
-  ++num_requests;
-  *block = __libc_memalign(alignment, num_bytes);
-  return *block == nullptr ? ENOMEM : 0;
-}
-void* memalign(size_t alignment, size_t num_bytes) {
-  ++num_requests;
-  return __libc_memalign(alignment, num_bytes);
-}
-}
+#include "tests/runtime/track/count_requests.h"
 
 namespace cairn {
 namespace {

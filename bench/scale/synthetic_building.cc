@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "bench/survey_writer.h"
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 
 namespace cairn {
@@ -83,7 +84,7 @@ Features SeeRoom(const std::vector<WallPoint>& points, const Pose& cam_from_worl
   const double focal = camera.params[0];
   const double min_cos = std::cos(kMaxIncidence_deg * std::numbers::pi / 180);
   const Eigen::Vector3d center = cam_from_world.Center();
-  std::vector<Keypoint> keypoints;
+  PooledVector<Keypoint> keypoints;
   std::vector<const WallPoint*> seen;
   for (const WallPoint& point : points) {
     const Eigen::Vector3d in_camera = cam_from_world.rotation * point.position + cam_from_world.translation;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace cairn {
 
 // The smallest value that at least `part` of them do not exceed (the nearest rank): for an even number,
 // Quantile(values, 0.5) is the lower of the middle two.
-inline double Quantile(std::vector<double> values, double part) {
+template <typename Allocator = std::allocator<double>>
+double Quantile(std::vector<double, Allocator> values, double part) {
   const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
   const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
   std::nth_element(values.begin(), nth, values.end());
@@ -21,17 +23,22 @@ inline double Quantile(std::vector<double> values, double part) {
 }
 
 // The value below which this many tenths of all, rounded down, lie.  REQUIRES: tenths in [0, 9]
-inline double Decile(std::vector<double> values, int tenths) {
+template <typename Allocator = std::allocator<double>>
+double Decile(std::vector<double, Allocator> values, int tenths) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() * tenths / 10);
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
 
 // The middle one; for an even number the upper of the middle two.
-inline double UpperMedian(std::vector<double> values) { return Decile(std::move(values), 5); }
+template <typename Allocator = std::allocator<double>>
+double UpperMedian(std::vector<double, Allocator> values) {
+  return Decile(std::move(values), 5);
+}
 
 // The middle one; for an even number the mean of the middle two.
-inline double Median(std::vector<double> values) {
+template <typename Allocator = std::allocator<double>>
+double Median(std::vector<double, Allocator> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   if (values.size() % 2 == 1) return *middle;

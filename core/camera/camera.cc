@@ -253,7 +253,7 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
     camera.params.push_back(param);
   }
   // Some programs repeat a panorama's size as its parameters.
-  const bool repeats_size = camera.params == std::vector<double>{double(width), double(height)};
+  const bool repeats_size = camera.params == PooledVector<double>{double(width), double(height)};
   if (camera.model == CameraModel::kEquirectangular && repeats_size) camera.params.clear();
   CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
   return camera;

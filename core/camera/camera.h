@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/base/pooled.h"
 
 namespace cairn {
 
@@ -44,7 +45,7 @@ struct Camera {
   CameraModel model = CameraModel::kSimplePinhole;
   int width = 0;   // px
   int height = 0;  // px
-  std::vector<double> params;
+  PooledVector<double> params;
   // False when the focal length is a guess (f = 1.2 max(w, h)).
   bool has_focal_prior = true;
 

@@ -1,5 +1,6 @@
 #include "core/colmap/colmap_database.h"
 
+#include "core/base/pooled.h"
 #include "core/base/printable.h"
 
 #include <algorithm>
@@ -129,9 +130,10 @@ Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& databas
     }
     camera.model = *model;
     CAIRN_ASSIGN_OR_RETURN(
-        camera.params,
+        const std::vector<double> params,
         BlobToVector<double>(query.getColumn(4), fmt::format("{}: table cameras, row {}",
                                                              DatabasePath(database), camera.camera_id)));
+    camera.params.assign(params.begin(), params.end());
     if (const Status status = CheckCamera(camera); !status.ok()) {
       return BadRow(database, "cameras", camera.camera_id, status.error().message);
     }
@@ -166,10 +168,10 @@ Keypoint KeypointOfShape(float x, float y, const float* shape) {
           std::atan2(shape[2], shape[0])};
 }
 
-Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id) {
+Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id) {
   SQLite::Statement query(database, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
   query.bind(1, image_id);
-  std::vector<Keypoint> keypoints;
+  PooledVector<Keypoint> keypoints;
   if (!query.executeStep()) return keypoints;
   RowReader row(query);
   // 2: x, y; 4: + scale, orientation; 6: x, y and an affine shape a11 a12 a21 a22 (COLMAP's FeatureKeypoint).

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/base/ids.h"
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "core/files/database.h"
@@ -73,7 +74,7 @@ Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& databas
 Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database);  // ascending image_id
 // A keypoint of an affine shape a11 a12 a21 a22, as COLMAP's FeatureKeypoint has its scale and orientation.
 Keypoint KeypointOfShape(float x, float y, const float* shape);
-Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
+Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
 // Of this kind, which the database says (ReadDescriptorKind).
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,
                                                  const DescriptorKind& kind = {});

@@ -56,7 +56,7 @@ Result<RigCamera> ReadCamera(const nlohmann::json& json, const std::string& plac
     const auto params = NumbersOf(json.value("camera_params", nlohmann::json()),
                                   static_cast<size_t>(NumCameraParams(intrinsics.model)));
     if (!params) return corrupt("as many numbers in 'camera_params' as its model has");
-    intrinsics.params = *params;
+    intrinsics.params.assign(params->begin(), params->end());
     camera.camera = std::move(intrinsics);
   }
   return camera;

@@ -93,7 +93,7 @@ Result<DescriptorMatrix> DescriptorsFromBytes(const uint8_t* bytes, int64_t num_
                      num_bytes, expected, ToString(kind));
   }
   if (is_binary) return DescriptorsFromBits(bytes, num_rows, num_bytes, kind);
-  return DescriptorMatrix(Eigen::Map<const DescriptorMatrix>(bytes, num_rows, num_bytes));
+  return DescriptorMatrix(Eigen::Map<const DescriptorMatrix::Matrix>(bytes, num_rows, num_bytes));
 }
 
 void RoundToBits(const DescriptorKind& kind, DescriptorMatrix* descriptors) {

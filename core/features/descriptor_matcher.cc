@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/pooled.h"
 #include "core/features/best_two_kernel.h"
 #include "core/features/descriptor_distance.h"
 
@@ -87,8 +88,8 @@ void Offer(uint32_t best_key, uint32_t second_key, int index_bits, const GroupRa
 }
 
 void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestTwoKernel& kernel,
-                 const SweepSpace& space, int index_bits, Scratch* scratch, std::vector<BestTwo>* rows,
-                 std::vector<BestTwo>* columns) {
+                 const SweepSpace& space, int index_bits, Scratch* scratch, PooledVector<BestTwo>* rows,
+                 PooledVector<BestTwo>* columns) {
   const int lanes = kernel.lanes;
   BestTwoSweep sweep;
   sweep.num_row_groups = range1.end - range1.begin;
@@ -127,8 +128,8 @@ void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestT
 
 // All of a block of one image with all of a block of the other, in ranges that keys can index.
 void SweepBlocks(const DescriptorBlock& block1, const DescriptorBlock& block2, const BestTwoKernel& kernel,
-                 SweepSpace space, Scratch* scratch, std::vector<BestTwo>* rows,
-                 std::vector<BestTwo>* columns) {
+                 SweepSpace space, Scratch* scratch, PooledVector<BestTwo>* rows,
+                 PooledVector<BestTwo>* columns) {
   // Cauchy and Schwarz: no product is larger.
   const double max_dot =
       std::sqrt(static_cast<double>(block1.max_squared_norm) * static_cast<double>(block2.max_squared_norm));
@@ -148,7 +149,7 @@ void SweepBlocks(const DescriptorBlock& block1, const DescriptorBlock& block2, c
 }  // namespace
 
 void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
-                 std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
+                 PooledVector<BestTwo>* rows, PooledVector<BestTwo>* columns) {
   thread_local Scratch scratch;
   rows->assign(descriptors1.size(), {});
   columns->assign(descriptors2.size(), {});
@@ -164,23 +165,23 @@ void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors&
 }
 
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
-                 const DescriptorSpace& space, MatchKernel kernel, std::vector<BestTwo>* rows,
-                 std::vector<BestTwo>* columns) {
+                 const DescriptorSpace& space, MatchKernel kernel, PooledVector<BestTwo>* rows,
+                 PooledVector<BestTwo>* columns) {
   FindBestTwo(PackedDescriptors(descriptors1, space, kernel), PackedDescriptors(descriptors2, space, kernel),
               rows, columns);
 }
 
-std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
-                                    const DescriptorMatrix& descriptors2, const DescriptorSpace& space,
-                                    const DescriptorMatcherOptions& options) {
+PooledVector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
+                                     const DescriptorMatrix& descriptors2, const DescriptorSpace& space,
+                                     const DescriptorMatcherOptions& options) {
   return MatchDescriptors(PackedDescriptors(descriptors1, space), PackedDescriptors(descriptors2, space),
                           options);
 }
 
-std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
-                                    const PackedDescriptors& descriptors2,
-                                    const DescriptorMatcherOptions& options) {
-  std::vector<BestTwo> rows, columns;
+PooledVector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
+                                     const PackedDescriptors& descriptors2,
+                                     const DescriptorMatcherOptions& options) {
+  PooledVector<BestTwo> rows, columns;
   FindBestTwo(descriptors1, descriptors2, &rows, &columns);
   const auto passes = [&](const BestTwo& b) {
     const DescriptorSpace& space = descriptors1.space();
@@ -188,7 +189,7 @@ std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
     return best <= options.max_angle_rad &&
            (b.second < 0 || best < options.max_ratio * DescriptorAngleRad(b.second, space));
   };
-  std::vector<Match> matches;
+  PooledVector<Match> matches;
   for (uint32_t row = 0; row < rows.size(); ++row) {
     const BestTwo& best = rows[row];
     if (best.idx < 0) continue;

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
+#include "core/base/pooled.h"
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
 
@@ -23,13 +23,13 @@ struct DescriptorMatcherOptions {
 // memory O(size1 + size2).  Reading a set from main memory takes under 1 % of a pair's time: callers need not
 // order pairs for the processor's caches, only to keep few descriptors packed. REQUIRES: both packed for the
 // same kernel and space.
-std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
-                                    const PackedDescriptors& descriptors2,
-                                    const DescriptorMatcherOptions& options);
+PooledVector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
+                                     const PackedDescriptors& descriptors2,
+                                     const DescriptorMatcherOptions& options);
 // The same for sets that are matched once: packs both.
-std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
-                                    const DescriptorMatrix& descriptors2, const DescriptorSpace& space,
-                                    const DescriptorMatcherOptions& options);
+PooledVector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
+                                     const DescriptorMatrix& descriptors2, const DescriptorSpace& space,
+                                     const DescriptorMatcherOptions& options);
 
 // The two largest dot products of one descriptor about the space's offset: what the kernels compute.  -1
 // where there are fewer; of other spaces than SIFT's those of 0 and less do not count.
@@ -41,9 +41,9 @@ struct BestTwo {
 // Best two of 2 for every descriptor of 1 (rows), and best two of 1 for every one of 2 (columns), in one
 // sweep.  REQUIRES: both packed for the same kernel and space.
 void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
-                 std::vector<BestTwo>* rows, std::vector<BestTwo>* columns);
+                 PooledVector<BestTwo>* rows, PooledVector<BestTwo>* columns);
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
-                 const DescriptorSpace& space, MatchKernel kernel, std::vector<BestTwo>* rows,
-                 std::vector<BestTwo>* columns);
+                 const DescriptorSpace& space, MatchKernel kernel, PooledVector<BestTwo>* rows,
+                 PooledVector<BestTwo>* columns);
 
 }  // namespace cairn

@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <Eigen/Core>
 
 #include "core/base/error.h"
+#include "core/base/pooled.h"
 
 namespace cairn {
 
@@ -24,8 +24,71 @@ inline constexpr int kSiftDescriptorDim = 128;  // values of a SIFT descriptor
 inline constexpr int kMinDescriptorDim = 32;
 inline constexpr int kMaxDescriptorDim = 1024;
 
-// One descriptor per row, of 8-bit values; DescriptorKind says what they mean.
-using DescriptorMatrix = Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+// One descriptor per row, of 8-bit values; DescriptorKind says what they mean.  A matrix of Eigen's in memory
+// that is used again (core/base/pooled.h).
+class DescriptorMatrix
+    : public Eigen::Map<Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> {
+ public:
+  using Matrix = Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  DescriptorMatrix() : Map(nullptr, 0, 0) {}
+  // Of any values.
+  DescriptorMatrix(Eigen::Index rows, Eigen::Index cols) : DescriptorMatrix() { resize(rows, cols); }
+  DescriptorMatrix(const DescriptorMatrix& other) : Map(nullptr, 0, 0), values_(other.values_) {
+    Show(other.rows(), other.cols());
+  }
+  DescriptorMatrix(DescriptorMatrix&& other) noexcept : DescriptorMatrix() { swap(other); }
+  template <typename Derived>
+  DescriptorMatrix(const Eigen::DenseBase<Derived>& other)  // NOLINT: as Eigen's
+      : DescriptorMatrix(other.rows(), other.cols()) {
+    Map::operator=(other.derived());
+  }
+  // REQUIRES: not of a part of itself
+  DescriptorMatrix& operator=(const DescriptorMatrix& other) {
+    values_ = other.values_;
+    Show(other.rows(), other.cols());
+    return *this;
+  }
+  DescriptorMatrix& operator=(DescriptorMatrix&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  template <typename Derived>
+  DescriptorMatrix& operator=(const Eigen::DenseBase<Derived>& other) {
+    DescriptorMatrix copy(other);
+    swap(copy);
+    return *this;
+  }
+  ~DescriptorMatrix() = default;
+
+  void swap(DescriptorMatrix& other) noexcept {
+    values_.swap(other.values_);
+    const Eigen::Index num_rows = rows(), num_cols = cols();
+    Show(other.rows(), other.cols());
+    other.Show(num_rows, num_cols);
+  }
+  // What the values are then is not said.
+  void resize(Eigen::Index rows, Eigen::Index cols) {
+    values_.resize(static_cast<size_t>(rows * cols));
+    Show(rows, cols);
+  }
+  // Rows that there were are kept.  REQUIRES: as many columns, or no rows before
+  void conservativeResize(Eigen::Index rows, Eigen::Index cols) { resize(rows, cols); }
+  void conservativeResize(Eigen::Index rows, Eigen::NoChange_t /*cols*/) { resize(rows, cols()); }
+
+  static auto Zero(Eigen::Index rows, Eigen::Index cols) { return Matrix::Zero(rows, cols); }
+  static auto Constant(Eigen::Index rows, Eigen::Index cols, uint8_t value) {
+    return Matrix::Constant(rows, cols, value);
+  }
+
+ private:
+  // As Eigen's pages have it for a map to other memory.
+  void Show(Eigen::Index rows, Eigen::Index cols) {
+    new (static_cast<Map*>(this)) Map(values_.data(), rows, cols);
+  }
+
+  PooledVector<uint8_t> values_;
+};
 using DescriptorRow = Eigen::Matrix<uint8_t, 1, Eigen::Dynamic>;
 
 // How descriptors are compared.  All are vectors of 8-bit values less an offset, and the nearest of a
@@ -105,7 +168,7 @@ Status CheckSameKind(const DescriptorKind& found, const DescriptorKind& expected
 
 // The features of one image, row i of `descriptors` belonging to keypoint i.
 struct Features {
-  std::vector<Keypoint> keypoints;
+  PooledVector<Keypoint> keypoints;
   DescriptorMatrix descriptors = DescriptorMatrix(0, kSiftDescriptorDim);
   DescriptorKind kind;
 };

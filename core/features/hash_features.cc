@@ -2,7 +2,7 @@
 
 namespace cairn {
 
-ContentHash HashFeatures(const std::vector<Keypoint>& keypoints, const DescriptorMatrix& descriptors) {
+ContentHash HashFeatures(const PooledVector<Keypoint>& keypoints, const DescriptorMatrix& descriptors) {
   static_assert(sizeof(Keypoint) == 4 * sizeof(float));
   return ContentHasher()
       .Hash(HashContents(
@@ -13,3 +13,5 @@ ContentHash HashFeatures(const std::vector<Keypoint>& keypoints, const Descripto
 }
 
 }  // namespace cairn
+
+#include "core/base/pooled.h"

@@ -210,8 +210,8 @@ PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, const 
 int64_t PackedDescriptors::num_bytes() const {
   int64_t num_bytes = sizeof(*this);
   for (const DescriptorBlock* block : {&small_, &other_}) {
-    num_bytes += static_cast<int64_t>(block->idx.capacity() * sizeof(int32_t)) + block->words.num_bytes() +
-                 block->bias.num_bytes() + block->terms.num_bytes();
+    num_bytes += static_cast<int64_t>(PooledSize(block->idx.capacity() * sizeof(int32_t))) +
+                 block->words.num_bytes() + block->bias.num_bytes() + block->terms.num_bytes();
   }
   return num_bytes;
 }

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <string_view>
-#include <vector>
 
+#include "core/base/pooled.h"
 #include "core/features/features.h"
 
 namespace cairn {
@@ -30,20 +30,20 @@ class AlignedWords {
   void Resize(int64_t num_words) { lines_.resize((num_words + 15) / 16); }
   uint32_t* data() { return lines_.empty() ? nullptr : lines_.front().words; }
   const uint32_t* data() const { return lines_.empty() ? nullptr : lines_.front().words; }
-  int64_t num_bytes() const { return static_cast<int64_t>(lines_.capacity() * sizeof(Line)); }
+  int64_t num_bytes() const { return static_cast<int64_t>(PooledSize(lines_.capacity() * sizeof(Line))); }
 
  private:
   struct alignas(64) Line {
     uint32_t words[16];
   };
-  std::vector<Line> lines_;
+  PooledVector<Line> lines_;
 };
 
 // Descriptors in the layout of core/features/best_two_kernel.h, those of SIFT with their values in an order
 // that mixes its cells and directions: 16-bit sums of the products of neighbours are then exact for nearly
 // all RootSIFT descriptors.
 struct DescriptorBlock {
-  std::vector<int32_t> idx;  // of each descriptor in its image, ascending
+  PooledVector<int32_t> idx;  // of each descriptor in its image, ascending
   AlignedWords words;
   AlignedWords bias;
   AlignedWords terms;  // the space's offset times the sum of values; none of SIFT's
@@ -70,7 +70,9 @@ class PackedDescriptors {
   // kernel: for memory budgets.
   static int64_t NumBytes(int64_t num_descriptors, int num_values) {
     const int64_t padded = (num_values + 3) / 4 * 4;
-    return (padded + 32) * num_descriptors + 128 * padded;
+    const int64_t asked = (padded + 32) * num_descriptors + 128 * padded;
+    constexpr int64_t kNumVectors = 8;
+    return asked + asked / 8 + kNumVectors * static_cast<int64_t>(PooledSize(0));
   }
 
   // Those that the kernel for small values may take (none if there is no such kernel), and the others.

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <vector>
 
+#include "core/base/pooled.h"
 #include "core/features/smaller_image.h"
 #include "core/sift/find_sift.h"
 
@@ -34,7 +34,7 @@ Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat&
       return is_wanted(KeypointFromOpenCv(x, y, size, 0));
     };
   }
-  const std::vector<SiftFeature> found = FindSift(grey, mask, search);
+  const PooledVector<SiftFeature> found = FindSift(grey, mask, search);
   features.descriptors.resize(static_cast<Eigen::Index>(found.size()), kSiftDescriptorDim);
   features.keypoints.reserve(found.size());
   for (const SiftFeature& feature : found) {

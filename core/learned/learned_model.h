@@ -2,13 +2,13 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include "core/base/content_hash.h"
 #include "core/base/error.h"
+#include "core/base/pooled.h"
 #include "core/features/features.h"
 
 namespace cairn {
@@ -26,8 +26,8 @@ struct LearnedOptions {
 
 // The features of one image, row i of `descriptors` belonging to keypoint i.
 struct LearnedFeatures {
-  std::vector<Keypoint> keypoints;  // scale and orientation are 0: they are not measured
-  FloatDescriptors descriptors;     // of norm 1
+  PooledVector<Keypoint> keypoints;  // scale and orientation are 0: they are not measured
+  FloatDescriptors descriptors;      // of norm 1
 };
 
 // A net that finds features in a grey image, from an ONNX file, with the outputs of XFeat [Potje24 §3.2]

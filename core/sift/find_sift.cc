@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <tuple>
 
+#include "core/base/pooled.h"
 #include "core/sift/gaussian.h"
 #include "core/sift/octave.h"
 #include "core/sift/sift_memory.h"
@@ -37,8 +39,8 @@ cv::Rect SoughtIn(const OctavePlan& plan, const cv::Rect& region) {
 
 // The octaves that are searched, and those that they begin with: octave 0, or where the image is not doubled
 // octave 1, which are made of the image.
-std::vector<OctavePlan> OctavesOf(cv::Size image, const SiftSearch& search) {
-  std::vector<OctavePlan> plans;
+PooledVector<OctavePlan> OctavesOf(cv::Size image, const SiftSearch& search) {
+  PooledVector<OctavePlan> plans;
   OctavePlan next{.size = image * 2};
   if (!search.doubled) {
     next = {.source = OctaveSource::kImage, .pixel = 1, .sigma = kSiftSigma / 2, .size = image};
@@ -59,8 +61,8 @@ std::vector<OctavePlan> OctavesOf(cv::Size image, const SiftSearch& search) {
 }
 
 // The same with the windows that are computed, and without those at the end where nothing is sought.
-std::vector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, const SiftSearch& search) {
-  std::vector<OctavePlan> plans = OctavesOf(image, search);
+PooledVector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, const SiftSearch& search) {
+  PooledVector<OctavePlan> plans = OctavesOf(image, search);
   for (OctavePlan& plan : plans) {
     if (plan.octave >= search.first_octave) plan.sought = SoughtIn(plan, region);
   }
@@ -89,6 +91,10 @@ std::vector<OctavePlan> PlanOctaves(cv::Size image, const cv::Rect& region, cons
   return plans;
 }
 
+bool IsBefore(const SiftExtremum& a, const SiftExtremum& b) {
+  return std::tie(a.octave, a.layer, a.y, a.x) < std::tie(b.octave, b.layer, b.y, b.x);
+}
+
 bool SamePlace(const SiftExtremum& a, const SiftExtremum& b) {
   return a.octave == b.octave && a.layer == b.layer && a.x == b.x && a.y == b.y;
 }
@@ -104,16 +110,14 @@ struct Located {
 };
 
 // Extrema that are wanted, each once, ordered by octave and place.
-std::vector<Located> SelectExtrema(const std::vector<Octave>& octaves, const cv::Mat& mask,
-                                   const SiftSearch& search, const cv::Rect& region,
-                                   std::vector<SiftExtremum> extrema) {
-  std::sort(extrema.begin(), extrema.end(), [](const SiftExtremum& a, const SiftExtremum& b) {
-    return std::tie(a.octave, a.layer, a.y, a.x) < std::tie(b.octave, b.layer, b.y, b.x);
-  });
+PooledVector<Located> SelectExtrema(std::span<const Octave> octaves, const cv::Mat& mask,
+                                    const SiftSearch& search, const cv::Rect& region,
+                                    PooledVector<SiftExtremum> extrema) {
+  std::sort(extrema.begin(), extrema.end(), IsBefore);
   extrema.erase(std::unique(extrema.begin(), extrema.end(), SamePlace), extrema.end());
   // The doubled image's pixels are where OpenCV states them; those of the image a quarter pixel before.
   const float offset = search.doubled ? 0 : 0.25f;
-  std::vector<Located> located;
+  PooledVector<Located> located;
   located.reserve(extrema.size());
   auto octave = octaves.begin();
   for (const SiftExtremum& e : extrema) {
@@ -173,7 +177,7 @@ std::array<float, kSiftDirections + 2> SmoothHistogram(const Octave& octave, con
 }
 
 // A keypoint for each of the histogram's peaks [Lowe04 §5].
-void AddOriented(const Located& located, const SiftKernels& kernels, std::vector<Located>* oriented) {
+void AddOriented(const Located& located, const SiftKernels& kernels, PooledVector<Located>* oriented) {
   const auto smooth = SmoothHistogram(*located.octave, located.extremum, kernels);
   const float least = 0.8f * *std::max_element(smooth.begin(), smooth.end());
   for (int b = 0; b < kSiftDirections; ++b) {
@@ -190,14 +194,15 @@ void AddOriented(const Located& located, const SiftKernels& kernels, std::vector
 
 // The strongest features, those as strong as the weakest one in the order of their places.  Orientations
 // are found only as far down as they are needed.
-std::vector<Located> OrientStrongest(std::vector<Located> located, size_t max_num,
-                                     const SiftKernels& kernels) {
+PooledVector<Located> OrientStrongest(PooledVector<Located> located, size_t max_num,
+                                      const SiftKernels& kernels) {
   if (located.size() > max_num) {
-    std::stable_sort(located.begin(), located.end(), [](const Located& a, const Located& b) {
-      return a.extremum.response > b.extremum.response;
+    std::sort(located.begin(), located.end(), [](const Located& a, const Located& b) {
+      return a.extremum.response != b.extremum.response ? a.extremum.response > b.extremum.response
+                                                        : IsBefore(a.extremum, b.extremum);
     });
   }
-  std::vector<Located> oriented;
+  PooledVector<Located> oriented;
   oriented.reserve(std::min(located.size(), max_num) + located.size() / 4);
   size_t num_done = 0;
   while (num_done < located.size() && oriented.size() < max_num) {
@@ -241,9 +246,9 @@ void Describe(const Located& oriented, const SiftKernels& kernels, uint8_t* root
 }
 
 // Descriptors of keypoints, octave by octave, as neighbours share what is in the caches.
-std::vector<SiftFeature> DescribeAll(const std::vector<Octave>& octaves, const std::vector<Located>& oriented,
-                                     const SiftKernels& kernels) {
-  std::vector<SiftFeature> features(oriented.size());
+PooledVector<SiftFeature> DescribeAll(std::span<const Octave> octaves, std::span<const Located> oriented,
+                                      const SiftKernels& kernels) {
+  PooledVector<SiftFeature> features(oriented.size());
   for (const Octave& octave : octaves) {
     for (size_t i = 0; i < oriented.size(); ++i) {
       const Located& o = oriented[i];
@@ -262,18 +267,18 @@ std::vector<SiftFeature> DescribeAll(const std::vector<Octave>& octaves, const s
 
 }  // namespace
 
-std::vector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
-                                  const SiftKernels& kernels) {
+PooledVector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
+                                   const SiftKernels& kernels) {
   thread_local SiftMemory memory;
   const cv::Rect region = search.region & cv::Rect({0, 0}, grey.size());
   if (region.empty() && !search.region.empty()) return {};
-  const std::vector<OctavePlan> plans = PlanOctaves(grey.size(), region, search);
+  const PooledVector<OctavePlan> plans = PlanOctaves(grey.size(), region, search);
   size_t num_floats = 0;
   for (const OctavePlan& plan : plans) num_floats += Octave::NumFloats(plan);
   float* next = memory.Take(num_floats);
-  std::vector<Octave> octaves;
+  PooledVector<Octave> octaves;
   octaves.reserve(plans.size());
-  std::vector<SiftExtremum> extrema;
+  PooledVector<SiftExtremum> extrema;
   const SiftThresholds thresholds{search.contrast_threshold, search.edge_threshold};
   for (const OctavePlan& plan : plans) {
     Octave& octave = octaves.emplace_back(plan, next, kernels);
@@ -284,10 +289,10 @@ std::vector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, cons
       octave.Sweep(grey, thresholds, &extrema);
     }
   }
-  const std::vector<Located> oriented =
+  const PooledVector<Located> oriented =
       OrientStrongest(SelectExtrema(octaves, mask, search, region, std::move(extrema)),
                       static_cast<size_t>(search.max_num_features), kernels);
-  std::vector<SiftFeature> features = DescribeAll(octaves, oriented, kernels);
+  PooledVector<SiftFeature> features = DescribeAll(octaves, oriented, kernels);
   memory.Trim(kMaxFloatsKept);
   return features;
 }

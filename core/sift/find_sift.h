@@ -10,10 +10,10 @@
 #include <array>
 #include <functional>
 #include <limits>
-#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
+#include "core/base/pooled.h"
 #include "core/sift/choose_kernels.h"
 
 namespace cairn {
@@ -62,7 +62,7 @@ struct SiftFeature {
 //
 // Takes about 75 bytes of memory for each pixel computed; a thread keeps up to 64 MiB of them for its next
 // image.  Throws: bad_alloc.
-std::vector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
-                                  const SiftKernels& kernels = BestSiftKernels());
+PooledVector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
+                                   const SiftKernels& kernels = BestSiftKernels());
 
 }  // namespace cairn

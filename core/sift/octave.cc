@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/pooled.h"
 #include "core/sift/gaussian.h"
 #include "core/sift/refine_extremum.h"
 
@@ -133,7 +134,7 @@ void Octave::BlurRows(int level, int y, int num) {
 }
 
 void Octave::Sweep(const cv::Mat& grey, const SiftThresholds& thresholds,
-                   std::vector<SiftExtremum>* extrema) {
+                   PooledVector<SiftExtremum>* extrema) {
   const cv::Rect& window = plan_.window;
   const auto pixels = [&](int row, int x) {
     return grey.ptr<uint8_t>(std::clamp(row, 0, grey.rows - 1)) + x;
@@ -160,7 +161,7 @@ void Octave::Sweep(const cv::Mat& grey, const SiftThresholds& thresholds,
 }
 
 void Octave::Sweep(const Octave& before, const SiftThresholds& thresholds,
-                   std::vector<SiftExtremum>* extrema) {
+                   PooledVector<SiftExtremum>* extrema) {
   const cv::Rect& window = plan_.window;
   const int first_x = 2 * window.x - before.window().x, first_y = 2 * window.y - before.window().y;
   SweepRows(
@@ -175,7 +176,7 @@ void Octave::Sweep(const Octave& before, const SiftThresholds& thresholds,
 }
 
 void Octave::Search(int y, int num, const SiftThresholds& thresholds,
-                    std::vector<SiftCandidate>* candidates) {
+                    PooledVector<SiftCandidate>* candidates) {
   const cv::Rect sought = plan_.sought - plan_.window.tl();
   const int begin = std::max(y, sought.y), end = std::min(y + num, sought.br().y);
   if (begin >= end) return;
@@ -193,11 +194,11 @@ void Octave::Search(int y, int num, const SiftThresholds& thresholds,
 
 template <typename FirstLevelRows>
 void Octave::SweepRows(const FirstLevelRows& first_level_rows, const SiftThresholds& thresholds,
-                       std::vector<SiftExtremum>* extrema) {
+                       PooledVector<SiftExtremum>* extrema) {
   const int num_rows = plan_.window.height;
   const int top = plan_.sought.empty() ? kSiftLayers : kSiftLevels - 1;
   std::array<int, kSiftLevels> num_done{};
-  std::vector<SiftCandidate> candidates;
+  PooledVector<SiftCandidate> candidates;
   for (int y = 0; y < num_rows; y += kSiftBatchRows) {
     // Rows that those of the top level need.
     std::array<int, kSiftLevels> end{};

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
+#include "core/base/pooled.h"
 #include "core/sift/sift_kernels.h"
 
 namespace cairn {
@@ -58,8 +58,8 @@ class Octave {
   // Computes the levels from the image or from the octave before, which has to be computed, and appends the
   // extrema sought.  Rows of all levels advance together, so that they are read from a near
   // cache.
-  void Sweep(const cv::Mat& grey, const SiftThresholds& thresholds, std::vector<SiftExtremum>* extrema);
-  void Sweep(const Octave& before, const SiftThresholds& thresholds, std::vector<SiftExtremum>* extrema);
+  void Sweep(const cv::Mat& grey, const SiftThresholds& thresholds, PooledVector<SiftExtremum>* extrema);
+  void Sweep(const Octave& before, const SiftThresholds& thresholds, PooledVector<SiftExtremum>* extrema);
 
   const OctavePlan& plan() const { return plan_; }
   const cv::Rect& window() const { return plan_.window; }
@@ -78,9 +78,9 @@ class Octave {
   };
   template <typename FirstLevelRows>
   void SweepRows(const FirstLevelRows& first_level_rows, const SiftThresholds& thresholds,
-                 std::vector<SiftExtremum>* extrema);
+                 PooledVector<SiftExtremum>* extrema);
   void BlurRows(int level, int y, int num);
-  void Search(int y, int num, const SiftThresholds& thresholds, std::vector<SiftCandidate>* candidates);
+  void Search(int y, int num, const SiftThresholds& thresholds, PooledVector<SiftCandidate>* candidates);
   float* MutableRow(int level, int y) { return levels_[level].first + (y & levels_[level].mask) * stride_; }
 
   OctavePlan plan_;

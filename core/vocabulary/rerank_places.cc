@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/estimate_two_view.h"
@@ -15,7 +16,7 @@ namespace {
 
 Correspondences FiniteMatches(const PlaceView& query, const PlaceView& candidate,
                               const RerankOptions& options) {
-  const std::vector<Match> matches =
+  const PooledVector<Match> matches =
       MatchDescriptors(query.packed, candidate.packed,
                        {.max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad});
   Correspondences finite;

@@ -16,7 +16,7 @@ constexpr int64_t kChunk = 4096;  // members a task assigns at a time
 
 using Sums = std::vector<int64_t>;
 using ChunkSums = std::vector<int32_t>;  // kChunk * 255 fits
-using DescriptorRows = Eigen::Ref<const DescriptorMatrix>;
+using DescriptorRows = Eigen::Ref<const DescriptorMatrix::Matrix>;
 
 // The direction of a sum of so many descriptors, quantised like a descriptor.
 DescriptorRow CentreFromSums(const Sums& sums, int64_t num, const DescriptorSpace& space) {

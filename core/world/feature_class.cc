@@ -194,7 +194,9 @@ Result<std::vector<Camera>> SelectCameras(SQLite::Database& database, const std:
     CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromId(row.getColumn(1).getInt()));
     camera.width = row.getColumn(2).getInt();
     camera.height = row.getColumn(3).getInt();
-    CAIRN_ASSIGN_OR_RETURN(camera.params, BlobToVector<double>(row.getColumn(4), path + ": " + table));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<double> params,
+                           BlobToVector<double>(row.getColumn(4), path + ": " + table));
+    camera.params.assign(params.begin(), params.end());
     camera.has_focal_prior = row.getColumn(5).getInt() != 0;
     CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
     cameras.push_back(camera);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/work/work_budget.h"
 #include "runtime/localize/place_evidence.h"
 
@@ -23,10 +25,10 @@ struct Explanation {
   const Localization* fix = nullptr;  // null: one of several
 };
 
-std::vector<Explanation> ExplanationsOf(const Localization& found) {
+PooledVector<Explanation> ExplanationsOf(const Localization& found) {
   if (found.has_fix())
     return {{found.cam_from_world, found.num_unguided_inliers, OddsOf(found.probability), &found}};
-  std::vector<Explanation> several;
+  PooledVector<Explanation> several;
   for (size_t k = 0; k < found.possible_poses.size(); ++k) {
     // P = odds / (1 + the odds of all).
     const double odds = found.possible_probabilities[k] / std::max(1e-12, 1 - found.probability);
@@ -37,8 +39,8 @@ std::vector<Explanation> ExplanationsOf(const Localization& found) {
 
 // The places that explain an image, each by what it has most matches for, that with most first; without those
 // that a fix is a thousand times likelier than.
-std::vector<Explanation> PlacesOf(const std::vector<Localization>& found, const AcceptOptions& accept) {
-  std::vector<Explanation> places;
+PooledVector<Explanation> PlacesOf(const std::vector<Localization>& found, const AcceptOptions& accept) {
+  PooledVector<Explanation> places;
   for (const Localization& each : found) {
     for (const Explanation& explanation : ExplanationsOf(each)) places.push_back(explanation);
   }
@@ -69,9 +71,9 @@ std::vector<Explanation> PlacesOf(const std::vector<Localization>& found, const 
   return places;
 }
 
-int NumCells(const Sighting& sighting, const std::vector<Correspondence>& inliers, int grid) {
+int NumCells(const Sighting& sighting, std::span<const Correspondence> inliers, int grid) {
   const auto side = static_cast<size_t>(grid) + 1;  // the last of pixels on the image's edge
-  std::vector<char> cells(sighting.images.size() * side * side);
+  PooledVector<char> cells(sighting.images.size() * side * side);
   const auto cell = [&](float coordinate, int size) {
     return static_cast<size_t>(std::clamp(static_cast<int>(coordinate * grid / size), 0, grid));
   };
@@ -90,7 +92,7 @@ double Log10Choose(int n, int k) {
 
 }  // namespace
 
-double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& rig_from_world,
+double ChanceOfInlier(std::span<const PoseMeasurement> measurements, const Pose& rig_from_world,
                       double max_error_px, const Sighting& sighting) {
   constexpr size_t kMaxSamples = 400;  // matches looked at; pairs grow with their square
   const size_t stride = measurements.size() / kMaxSamples + 1;
@@ -98,7 +100,7 @@ double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Po
     const PoseMeasurement* measurement;
     Eigen::Vector2d ray;  // of the landmark
   };
-  std::vector<Seen> samples;
+  PooledVector<Seen> samples;
   for (size_t i = 0; i < measurements.size(); i += stride) {
     const Eigen::Vector3d point = measurements[i].InCamera(rig_from_world * measurements[i].point);
     if (point.z() > 0) samples.push_back({&measurements[i], point.hnormalized()});
@@ -255,9 +257,8 @@ Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& op
   return {};
 }
 
-Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers,
-                  const Sighting& sighting, double distance_from_survey_m, const AcceptOptions& options,
-                  const char* length_unit) {
+Verdict JudgePose(const RefinedPose& pose, std::span<const Correspondence> inliers, const Sighting& sighting,
+                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit) {
   if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
     return {NoFix::kTooFewInliers,
             fmt::format("{} inliers, at least {} are needed", inliers.size(), options.min_num_inliers)};
@@ -312,7 +313,7 @@ Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::
 
 Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
                          const AcceptOptions& accept) {
-  const std::vector<Explanation> places = PlacesOf(found, accept);
+  const PooledVector<Explanation> places = PlacesOf(found, accept);
   const Explanation& best = places.front();
   double odds_of_all = 0;
   for (const Explanation& place : places) odds_of_all += place.odds;

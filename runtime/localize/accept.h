@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace cairn {
 // measured on the matches themselves, each keypoint against the other matches' landmarks, and no less than a
 // disc's share of the images.  Near 1 where all landmarks project into one corner: there, inliers say
 // nothing.
-double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& rig_from_world,
+double ChanceOfInlier(std::span<const PoseMeasurement> measurements, const Pose& rig_from_world,
                       double max_error_px, const Sighting& sighting);
 
 // Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches
@@ -35,9 +36,8 @@ Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& op
 
 // Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey, and upright
 // where up is known.
-Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers,
-                  const Sighting& sighting, double distance_from_survey_m, const AcceptOptions& options,
-                  const char* length_unit);
+Verdict JudgePose(const RefinedPose& pose, std::span<const Correspondence> inliers, const Sighting& sighting,
+                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit);
 
 // Whether two poses are at different places.
 bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept);

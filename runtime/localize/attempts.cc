@@ -3,9 +3,11 @@
 #include <cmath>
 #include <iterator>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/blocks/map_rows.h"
 #include "core/promise/view_distance.h"
@@ -30,15 +32,14 @@ int64_t PicosecondsOfGuided() {
 
 size_t Localizer::Attempt::num_landmarks() const {
   size_t num = 0;
-  for (const std::vector<LandmarkIdx>& of_image : landmarks) num += of_image.size();
+  for (std::span<const LandmarkIdx> of_image : landmarks) num += of_image.size();
   return num;
 }
 
-Localizer::Attempt Localizer::WithAllImages(Scope scope, std::vector<LandmarkIdx> landmarks,
+Localizer::Attempt Localizer::WithAllImages(Scope scope, std::span<const LandmarkIdx> landmarks,
                                             const Sighting& sighting) {
   Attempt attempt{.scope = scope};
-  attempt.landmarks.assign(sighting.images.size() - 1, landmarks);
-  attempt.landmarks.push_back(std::move(landmarks));
+  attempt.landmarks.assign(sighting.images.size(), {landmarks.begin(), landmarks.end()});
   return attempt;
 }
 
@@ -46,7 +47,7 @@ Result<Localization> Localizer::LocalizeRig(const std::vector<RigImage>& images,
                                             const std::optional<PosePrior>& prior,
                                             const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize a rig", [&]() -> Result<Localization> {
-    std::vector<Query> queries;
+    PooledVector<Query> queries;
     const Budget work = MakeBudget();
     for (const RigImage& image : images) {
       const WorkBudget::Share share(work.get(), 1.0 / static_cast<double>(images.size() - queries.size()));
@@ -62,7 +63,7 @@ Result<Localization> Localizer::LocalizeRigFeatures(std::vector<RigFeatures> ima
                                                     const std::optional<PosePrior>& prior,
                                                     const std::optional<SensedUp>& up) {
   return WithoutExceptions("localize a rig", [&]() -> Result<Localization> {
-    std::vector<Query> queries;
+    PooledVector<Query> queries;
     const Budget work = MakeBudget();
     for (RigFeatures& image : images) {
       CAIRN_ASSIGN_OR_RETURN(Query query, QueryFromFeatures(std::move(image.features), image.camera, work));
@@ -87,7 +88,7 @@ Status Localizer::PutOnRig(const Pose& cam_from_rig, Query* query) const {
   return Ok();
 }
 
-Result<Localization> Localizer::LocalizeRigQueries(std::vector<Query> queries,
+Result<Localization> Localizer::LocalizeRigQueries(PooledVector<Query> queries,
                                                    const std::optional<PosePrior>& prior,
                                                    const std::optional<SensedUp>& up) const {
   if (queries.empty()) return MakeError(ErrorCode::kInvalidArgument, "localize: a rig without images");
@@ -111,9 +112,9 @@ PosePrior Localizer::PriorOfImage(const PosePrior& prior, const Query& query) co
   return of_image;
 }
 
-Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& sighting,
-                                                                const std::optional<PosePrior>& prior,
-                                                                std::vector<ImageId>* candidate_ids) const {
+Result<PooledVector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& sighting,
+                                                                 const std::optional<PosePrior>& prior,
+                                                                 std::vector<ImageId>* candidate_ids) const {
   Attempt near{.scope = Scope::kPrior}, of_regions{.scope = Scope::kRegions},
       of_images{.scope = Scope::kImages};
   for (const Query& query : sighting.images) {
@@ -137,7 +138,7 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
                                                                        MaxNumMatched(query), sighting.work));
     of_images.landmarks.push_back(std::move(landmarks_of_images));
   }
-  std::vector<Attempt> attempts;
+  PooledVector<Attempt> attempts;
   const auto add = [&](Attempt attempt) {
     if (attempt.num_landmarks() == 0) return;
     for (const Attempt& other : attempts) {
@@ -152,9 +153,9 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Sighting& 
   add(std::move(of_regions));
   add(std::move(of_images));
   if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
-    std::vector<LandmarkIdx> all(map_->num_landmarks());
+    PooledVector<LandmarkIdx> all(map_->num_landmarks());
     std::iota(all.begin(), all.end(), 0);
-    add(WithAllImages(Scope::kAll, std::move(all), sighting));
+    add(WithAllImages(Scope::kAll, all, sighting));
   }
   return attempts;
 }
@@ -165,33 +166,33 @@ int64_t Localizer::MaxNumGuided(const Sighting& sighting, size_t num_poses) {
                        kGuidedPart / static_cast<double>(num_poses * sighting.images.size()));
 }
 
-Result<std::vector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& sighting,
-                                                               const std::vector<Correspondence>& inliers,
-                                                               const Pose& rig_from_world,
-                                                               int64_t max_num) const {
+Result<PooledVector<LandmarkIdx>> Localizer::LandmarksToLookFor(const Sighting& sighting,
+                                                                std::span<const Correspondence> inliers,
+                                                                const Pose& rig_from_world,
+                                                                int64_t max_num) const {
   if (sighting.num_images() == 1)
     return CovisibleLandmarks(*map_, LandmarksOf(inliers), options_.match, max_num, sighting.work);
   CAIRN_ASSIGN_OR_RETURN(const auto matched, map_->Gather(LandmarksOf(inliers), false));
-  std::vector<double> distances;
+  PooledVector<double> distances;
   for (const MapLandmark& landmark : matched->landmarks)
     distances.push_back((rig_from_world * landmark.position).norm());
   const ViewOptions one_view;
   const double radius_m = one_view.same_view_ratio * UpperMedian(std::move(distances));
-  std::vector<LandmarkIdx> landmarks;
+  PooledVector<LandmarkIdx> landmarks;
   for (int i = 0; i < sighting.num_images(); ++i) {
-    std::vector<Correspondence> of_image;
+    PooledVector<Correspondence> of_image;
     std::copy_if(inliers.begin(), inliers.end(), std::back_inserter(of_image),
                  [&](const Correspondence& inlier) { return inlier.image == i; });
-    std::vector<LandmarkIdx> seen;
+    PooledVector<LandmarkIdx> seen;
     if (!of_image.empty()) {
       CAIRN_ASSIGN_OR_RETURN(
           seen, CovisibleLandmarks(*map_, LandmarksOf(of_image), options_.match, max_num, sighting.work));
     } else {  // what the survey saw from near the place that the others give it
       CAIRN_ASSIGN_OR_RETURN(
-          const std::vector<NearView> near,
+          const PooledVector<NearView> near,
           NearestViews(*map_, sighting.images[i].cam_from_rig * rig_from_world, radius_m,
                        one_view.same_view_deg, options_.match.guided_num_images, sighting.work));
-      std::vector<int32_t> images;
+      PooledVector<int32_t> images;
       for (const NearView& view : near) images.push_back(view.image);
       CAIRN_ASSIGN_OR_RETURN(seen, LandmarksOfImages(*map_, images, max_num, sighting.work));
     }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "core/geometry/minimal_pose.h"
 #include "core/work/work_budget.h"
@@ -49,7 +51,7 @@ class CamerasAt {
 };
 
 // Sum of truncated errors; stops early once it exceeds `best`.
-double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit, double best,
+double Score(std::span<const PoseMeasurement> measurements, const Pose& pose, double limit, double best,
              WorkBudget* work) {
   CamerasAt cameras(pose);
   double sum = 0;
@@ -59,9 +61,9 @@ double Score(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
   return sum;
 }
 
-std::vector<int> Inliers(const std::vector<PoseMeasurement>& measurements, const Pose& pose, double limit) {
+PooledVector<int> Inliers(std::span<const PoseMeasurement> measurements, const Pose& pose, double limit) {
   CamerasAt cameras(pose);
-  std::vector<int> inliers;
+  PooledVector<int> inliers;
   inliers.reserve(measurements.size());
   for (size_t i = 0; i < measurements.size(); ++i) {
     if (cameras.TruncatedError(measurements[i], limit) < limit) inliers.push_back(static_cast<int>(i));
@@ -80,7 +82,7 @@ RigRay RayOf(const PoseMeasurement& measurement) {
 // The first N of a sample.
 template <size_t N>
 std::pair<std::array<RigRay, N>, std::array<Eigen::Vector3d, N>> RaysAndPointsOf(
-    const std::vector<PoseMeasurement>& measurements, const Sample& sample) {
+    std::span<const PoseMeasurement> measurements, const Sample& sample) {
   std::array<RigRay, N> rays;
   std::array<Eigen::Vector3d, N> points;
   for (size_t i = 0; i < N; ++i) {
@@ -91,7 +93,7 @@ std::pair<std::array<RigRay, N>, std::array<Eigen::Vector3d, N>> RaysAndPointsOf
 }
 
 // The poses that a sample leads to.
-MinimalPoses Solve(const std::vector<PoseMeasurement>& measurements, const Sample& sample, int sample_size,
+MinimalPoses Solve(std::span<const PoseMeasurement> measurements, const Sample& sample, int sample_size,
                    const std::optional<UpMeasurement>& up) {
   if (sample_size == 2) {
     const auto [rays, points] = RaysAndPointsOf<2>(measurements, sample);
@@ -128,9 +130,9 @@ int NumIterations(size_t num_inliers, size_t num_measurements, int sample_size,
                                      static_cast<double>(options.max_num_ransac_iterations)));
 }
 
-std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurements,
-                                    const std::vector<int>& indices) {
-  std::vector<PoseMeasurement> selected;
+PooledVector<PoseMeasurement> Select(std::span<const PoseMeasurement> measurements,
+                                     std::span<const int> indices) {
+  PooledVector<PoseMeasurement> selected;
   selected.reserve(indices.size());
   for (const int i : indices) selected.push_back(measurements[i]);
   return selected;
@@ -143,8 +145,7 @@ struct ScoredPose {
 
 // The score below which a pose is looked at: better than the last of a full list, and than the best but for
 // a quarter of its inliers.
-double ScoreNeeded(const std::vector<ScoredPose>& best, int max_num_poses, double limit,
-                   int num_measurements) {
+double ScoreNeeded(std::span<const ScoredPose> best, int max_num_poses, double limit, int num_measurements) {
   if (best.empty()) return limit * num_measurements;
   if (static_cast<int>(best.size()) == max_num_poses) return best.back().score;
   constexpr double kMaxFewer = 0.25;
@@ -153,12 +154,12 @@ double ScoreNeeded(const std::vector<ScoredPose>& best, int max_num_poses, doubl
 }
 
 // Whether they are of the same matches, most of them.
-bool IsSame(const std::vector<int>& a, const std::vector<int>& b) {
+bool IsSame(std::span<const int> a, std::span<const int> b) {
   return 10 * static_cast<size_t>(NumShared(a, b)) > 9 * std::min(a.size(), b.size());
 }
 
 // Puts a pose into a list by score, unless a better one has the same inliers; worse ones with the same leave.
-void Insert(ScoredPose pose, int max_num_poses, std::vector<ScoredPose>* best) {
+void Insert(ScoredPose pose, int max_num_poses, PooledVector<ScoredPose>* best) {
   const auto is_same = [&](const ScoredPose& other) {
     return IsSame(pose.estimate.inliers, other.estimate.inliers);
   };
@@ -202,21 +203,21 @@ OptionTable DescribeOptions(EstimateOptions* o) {
 namespace {
 
 // How far one standard deviation of up moves points in the image.
-double UpErrorPx(const std::vector<PoseMeasurement>& measurements, const UpMeasurement& up) {
+double UpErrorPx(std::span<const PoseMeasurement> measurements, const UpMeasurement& up) {
   return up.sigma_rad * std::sqrt(std::abs(measurements.front().ray.pixel_from_ray.determinant()));
 }
 
 }  // namespace
 
-bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
+bool UsesTwoPoints(std::span<const PoseMeasurement> measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options) {
   return up && !measurements.empty() && UpErrorPx(measurements, *up) <= options.max_error_px;
 }
 
-std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
-                                        const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed, const std::optional<UpMeasurement>& up,
-                                        WorkBudget* work) {
+PooledVector<PoseEstimate> EstimatePoses(std::span<const PoseMeasurement> measurements, int max_num_poses,
+                                         const EstimateOptions& options, const RefineOptions& refine_options,
+                                         uint64_t seed, const std::optional<UpMeasurement>& up,
+                                         WorkBudget* work) {
   const int num_measurements = static_cast<int>(measurements.size());
   if (num_measurements < kMinNumInliers) return {};
   // An error of up moves points in the image.  Of those that are inliers all the same, local refinement finds
@@ -228,7 +229,7 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
       up && !is_exact && UpErrorPx(measurements, *up) <= kMaxErrors * options.max_error_px;
   const int sample_size = is_exact || alternates ? 2 : 3;
   const double limit = options.max_error_px * options.max_error_px;
-  std::vector<ScoredPose> best;  // by score
+  PooledVector<ScoredPose> best;  // by score
   Random random(seed);
   RefineOptions local_options = refine_options;
   local_options.max_num_refine_iterations = 5;
@@ -242,7 +243,7 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
       double score = Score(measurements, pose, limit, needed, work);
       if (score >= needed) continue;
       Pose local = pose;
-      std::vector<int> inliers = Inliers(measurements, pose, limit);
+      PooledVector<int> inliers = Inliers(measurements, pose, limit);
       for (int round = 0; round < 3 && inliers.size() >= kMinNumInliers; ++round) {
         const auto refined = RefinePose(Select(measurements, inliers), local, local_options, up, work);
         const double refined_score = refined ? Score(measurements, *refined, limit, score, work) : score;
@@ -257,7 +258,7 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
       if (alternates) num_iterations = std::min(2 * num_iterations, options.max_num_ransac_iterations);
     }
   }
-  std::vector<PoseEstimate> poses;
+  PooledVector<PoseEstimate> poses;
   for (ScoredPose& pose : best) {
     pose.estimate.num_iterations = iteration;
     if (pose.estimate.inliers.size() >= kMinNumInliers) poses.push_back(std::move(pose.estimate));
@@ -265,20 +266,20 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
   return poses;
 }
 
-std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
+std::optional<PoseEstimate> EstimatePose(std::span<const PoseMeasurement> measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
                                          uint64_t seed, const std::optional<UpMeasurement>& up,
                                          WorkBudget* work) {
-  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed, up, work);
+  PooledVector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed, up, work);
   if (poses.empty()) return std::nullopt;
   return std::move(poses.front());
 }
 
-std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
+std::optional<PoseEstimate> EstimateOtherPose(std::span<const PoseMeasurement> measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
                                               const RefineOptions& refine_options, uint64_t seed,
                                               const std::optional<UpMeasurement>& up, WorkBudget* work) {
-  std::vector<int> indices;
+  PooledVector<int> indices;
   for (size_t i = 0, next = 0; i < measurements.size(); ++i) {
     if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
       ++next;

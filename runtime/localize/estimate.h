@@ -2,8 +2,9 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
+#include <span>
 
+#include "core/base/pooled.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/localizer_options.h"
 #include "runtime/localize/measurement.h"
@@ -14,13 +15,13 @@ inline constexpr uint64_t kRansacSeed = 0;  // fixed: an image always gives the 
 
 struct PoseEstimate {
   Pose cam_from_world;
-  std::vector<int> inliers;  // indices of measurements, ascending
+  PooledVector<int> inliers;  // indices of measurements, ascending
   int num_iterations = 0;
 };
 
 // Whether poses come from two points and up alone, as up is known better than an inlier; else from three as
 // well, of which those that tilt the camera are left out.
-bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::optional<UpMeasurement>& up,
+bool UsesTwoPoints(std::span<const PoseMeasurement> measurements, const std::optional<UpMeasurement>& up,
                    const EstimateOptions& options);
 
 // Pose from correspondences of which many are wrong: RANSAC over three points, or over two and up
@@ -31,17 +32,17 @@ bool UsesTwoPoints(const std::vector<PoseMeasurement>& measurements, const std::
 // Up to so many poses, the best first: no two share more than nine tenths of the fewer inliers, and one
 // that has a quarter fewer inliers than the best may not be found.  What is spent of `work` ends the search:
 // those that are found by then.
-std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
-                                        const EstimateOptions& options, const RefineOptions& refine_options,
-                                        uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt,
-                                        WorkBudget* work = nullptr);
+PooledVector<PoseEstimate> EstimatePoses(std::span<const PoseMeasurement> measurements, int max_num_poses,
+                                         const EstimateOptions& options, const RefineOptions& refine_options,
+                                         uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt,
+                                         WorkBudget* work = nullptr);
 // The best of them.  Nothing when no pose has at least 4 inliers.
-std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
+std::optional<PoseEstimate> EstimatePose(std::span<const PoseMeasurement> measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
                                          uint64_t seed, const std::optional<UpMeasurement>& up = std::nullopt,
                                          WorkBudget* work = nullptr);
 // The best of the measurements that are no inliers of a first.
-std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
+std::optional<PoseEstimate> EstimateOtherPose(std::span<const PoseMeasurement> measurements,
                                               const PoseEstimate& first, const EstimateOptions& options,
                                               const RefineOptions& refine_options, uint64_t seed,
                                               const std::optional<UpMeasurement>& up = std::nullopt,

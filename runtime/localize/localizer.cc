@@ -5,9 +5,11 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "core/features/features.h"
@@ -26,9 +28,9 @@
 namespace cairn {
 namespace {
 
-std::vector<Correspondence> Select(const std::vector<Correspondence>& correspondences,
-                                   const std::vector<int>& indices) {
-  std::vector<Correspondence> selected;
+PooledVector<Correspondence> Select(std::span<const Correspondence> correspondences,
+                                    std::span<const int> indices) {
+  PooledVector<Correspondence> selected;
   selected.reserve(indices.size());
   for (const int i : indices) selected.push_back(correspondences[i]);
   return selected;
@@ -59,7 +61,7 @@ Localization OverBudget(const WorkBudget& work, Localization found) {
 }
 
 // As many of these as may be, evenly.
-std::vector<LandmarkIdx> Thinned(std::vector<LandmarkIdx> landmarks, int64_t max_num) {
+PooledVector<LandmarkIdx> Thinned(PooledVector<LandmarkIdx> landmarks, int64_t max_num) {
   const int64_t num = std::ssize(landmarks);
   if (num <= max_num) return landmarks;
   for (int64_t i = 0; i < max_num; ++i) landmarks[i] = landmarks[i * num / max_num];
@@ -74,7 +76,7 @@ constexpr double kLeastMatchedPart = 0.5;
 
 // Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
 // not by different places.  Ascending by image and keypoint.
-bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspondence>& b) {
+bool ShareMost(std::span<const Correspondence> a, std::span<const Correspondence> b) {
   const auto keypoint = [](const Correspondence& match) { return std::pair(match.image, match.keypoint); };
   size_t num_shared = 0;
   for (size_t i = 0, j = 0; i < a.size() && j < b.size();) {
@@ -158,10 +160,11 @@ Status Localizer::CheckImage(const cv::Mat& grey, const Camera& camera) const {
 }
 
 std::shared_ptr<WorkBudget> Localizer::MakeBudget() const {
-  if (options_.budget_ms == 0) return std::make_shared<WorkBudget>();
+  const PoolAllocator<WorkBudget> pool;
+  if (options_.budget_ms == 0) return std::allocate_shared<WorkBudget>(pool);
   const double ms = options_.budget_ms * options_.core_speed;
   constexpr double kNone = -1;
-  return std::make_shared<WorkBudget>(ms > 0 ? ms : kNone);
+  return std::allocate_shared<WorkBudget>(pool, ms > 0 ? ms : kNone);
 }
 
 Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work) const {
@@ -258,9 +261,8 @@ Result<Localization> Localizer::LocalizeQuery(const Sighting& query,
   return LocalizeBetter(query, prior, Failure(NoFix::kNoCandidates, "no survey image looks like it"));
 }
 
-Result<Localization> Localizer::LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const {
-  CAIRN_ASSIGN_OR_RETURN(Localization localization,
-                         Try(query, WithAllImages(Scope::kVotes, std::move(voted), query)));
+Result<Localization> Localizer::LocalizeVoted(const Query& query, std::span<const LandmarkIdx> voted) const {
+  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, WithAllImages(Scope::kVotes, voted, query)));
   if (localization.has_fix() && localization.num_unguided_inliers >= options_.sure_num_unguided_inliers)
     return Answer(query, std::nullopt, std::move(localization));
   return LocalizeBetter(query, std::nullopt, std::move(localization));
@@ -271,7 +273,7 @@ Result<Localization> Localizer::LocalizeBetter(const Sighting& sighting,
                                                Localization best) const {
   std::vector<ImageId> candidate_ids;
   WorkBudget* const work = sighting.work;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(sighting, prior, &candidate_ids));
+  CAIRN_ASSIGN_OR_RETURN(const PooledVector<Attempt> attempts, MakeAttempts(sighting, prior, &candidate_ids));
   for (const Attempt& attempt : attempts) {
     if (IsSpent(work)) break;
     CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(sighting, attempt));
@@ -290,10 +292,9 @@ Result<Localization> Localizer::LocalizeBetter(const Sighting& sighting,
 }
 
 Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
-                                              std::vector<LandmarkIdx> landmarks,
+                                              std::span<const LandmarkIdx> landmarks,
                                               const std::optional<PosePrior>& prior) const {
-  CAIRN_ASSIGN_OR_RETURN(Localization localization,
-                         Try(query, WithAllImages(scope, std::move(landmarks), query)));
+  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, WithAllImages(scope, landmarks, query)));
   return Answer(query, prior, std::move(localization));
 }
 
@@ -326,13 +327,13 @@ Result<Localization> Localizer::Sharpen(const Query& query, const LandmarkSet& l
   WorkBudget* const work = query.work.get();
   fix.num_features = static_cast<int>(query.features.keypoints.size());
   const Pose first = map_->head().camera_from_given * fix.cam_from_world;
-  const std::vector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
+  const PooledVector<Correspondence> matches = MatchGuided(query, landmarks, first, options_.match);
   const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, landmarks, matches), first,
                                                 options_.refine, query.up, query.work.get());
   if (IsSpent(work) || !refined || static_cast<int>(refined->inliers.size()) < fix.num_inliers ||
       AreFarApart(refined->cam_from_world, first, options_.accept))
     return fix;
-  const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
+  const PooledVector<Correspondence> inliers = Select(matches, refined->inliers);
   CAIRN_ASSIGN_OR_RETURN(const double distance,
                          DistanceFromSurvey(*map_, refined->cam_from_world.Center(), work));
   const Verdict verdict =
@@ -362,9 +363,9 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
   std::shared_ptr<const LandmarkSet> landmarks;  // of all images
   bool is_thinned = false;
   if (!Spend(work, Work::kAttempt, 1)) return OverBudget(*work, std::move(localization));
-  std::vector<Correspondence> matches;
+  PooledVector<Correspondence> matches;
   for (int image = 0; image < sighting.num_images(); ++image) {
-    const std::vector<LandmarkIdx>& idx = attempt.landmarks[image];
+    const PooledVector<LandmarkIdx>& idx = attempt.landmarks[image];
     const bool is_known = image > 0 && idx == attempt.landmarks[image - 1];
     const bool all = static_cast<int64_t>(idx.size()) == map_->num_landmarks();
     const int64_t max_num = MaxNumMatched(sighting.images[image]);
@@ -396,7 +397,7 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
                 fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
                             attempt.num_landmarks(), accept.min_num_matches));
   }
-  const std::vector<PoseMeasurement> measurements = MakeMeasurements(sighting, *landmarks, matches);
+  const PooledVector<PoseMeasurement> measurements = MakeMeasurements(sighting, *landmarks, matches);
   const std::optional<UpMeasurement>& up = sighting.up;
   const char* with_gravity = up ? " with the sensed up" : "";
   std::optional<PoseEstimate> estimate;
@@ -431,7 +432,7 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
                             estimate->inliers.size(), matches.size(), with_gravity, log10_chance,
                             accept.min_num_unguided_inliers, accept.max_log10_chance));
   }
-  std::vector<PoseEstimate> firsts;
+  PooledVector<PoseEstimate> firsts;
   if (localization.num_unguided_inliers < options_.sure_num_unguided_inliers) {
     for (PoseEstimate& first : EstimatePoses(measurements, options_.estimate.max_num_first_poses,
                                              options_.estimate, options_.refine, kRansacSeed, up, work)) {
@@ -447,17 +448,17 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
 }
 
 Result<Localizer::FollowedUp> Localizer::FollowUp(const Sighting& sighting,
-                                                  const std::vector<Correspondence>& matches,
+                                                  std::span<const Correspondence> matches,
                                                   const PoseEstimate& first, int64_t max_num_guided) const {
   FollowedUp own{static_cast<int>(first.inliers.size()),
                  nullptr,
                  {Select(matches, first.inliers), first.cam_from_world}};
   if (options_.match.guided_num_images == 0) return own;
   CAIRN_ASSIGN_OR_RETURN(
-      std::vector<LandmarkIdx> seen,
+      PooledVector<LandmarkIdx> seen,
       LandmarksToLookFor(sighting, own.found.matches, first.cam_from_world, max_num_guided));
   if (!Spend(sighting.work, Work::kLandmark, seen.size())) return own;
-  CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(std::move(seen), false));
+  CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(seen, false));
   GuidedMatches guided =
       MatchGuidedInRounds(sighting, *covisible, first, options_.match, options_.estimate, options_.refine);
   if (guided.matches.size() < own.found.matches.size()) return own;
@@ -472,8 +473,8 @@ Result<PlaceEvidence> Localizer::EvidenceOf(const Sighting& sighting, const Land
 }
 
 Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkSet& matched,
-                                       const std::vector<Correspondence>& matches,
-                                       const std::vector<PoseEstimate>& firsts,
+                                       std::span<const Correspondence> matches,
+                                       std::span<const PoseEstimate> firsts,
                                        Localization localization) const {
   WorkBudget* const work = sighting.work;
   const auto fail = [&](NoFix reason, std::string message) {
@@ -483,7 +484,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
     return localization;
   };
   const int64_t max_num_guided = MaxNumGuided(sighting, firsts.size());
-  std::vector<FollowedUp> followed_up;
+  PooledVector<FollowedUp> followed_up;
   size_t most = 0;
   for (const PoseEstimate& first : firsts) {
     CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(sighting, matches, first, max_num_guided));
@@ -550,7 +551,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
     return fail(NoFix::kUncertain,
                 fmt::format("{} inliers do not determine the pose", best.found.matches.size()));
   }
-  const std::vector<Correspondence> inliers = Select(best.found.matches, refined->inliers);
+  const PooledVector<Correspondence> inliers = Select(best.found.matches, refined->inliers);
   localization.num_inliers = static_cast<int>(inliers.size());
   const double min_kept_ratio = options_.accept.min_kept_ratio;
   if (localization.num_inliers < min_kept_ratio * localization.num_unguided_inliers) {
@@ -574,7 +575,7 @@ Result<Localization> Localizer::Refine(const Sighting& sighting, const LandmarkS
   return localization;
 }
 
-std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurement>& measurements,
+std::optional<PoseEstimate> Localizer::SecondPose(std::span<const PoseMeasurement> measurements,
                                                   const PoseEstimate& first,
                                                   const std::optional<UpMeasurement>& up,
                                                   WorkBudget* work) const {
@@ -620,7 +621,7 @@ Result<const Query*> QueryFrame::WithAllFeatures() {
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, work_)
                                               : localizer_.QueryFromFeatures(features_, camera_, work_));
     if (up_) CAIRN_RETURN_IF_ERROR(localizer_.SetUp(*up_, &query));
-    query_ = std::make_shared<const Query>(std::move(query));
+    query_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(query));
   }
   return query_.get();
 }

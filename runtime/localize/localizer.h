@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "runtime/localize/localization.h"
@@ -91,10 +93,10 @@ class Localizer {
   Status SetUp(const SensedUp& up, Query* query) const;
   Result<Localization> LocalizeQuery(const Sighting& query, const std::optional<PosePrior>& prior) const;
   // The same, but these landmarks (ascending), of regions that were voted for, are matched before all others.
-  Result<Localization> LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const;
+  Result<Localization> LocalizeVoted(const Query& query, std::span<const LandmarkIdx> voted) const;
   // Localizes among these landmarks (ascending) only, and those of look-alikes that the prior does
   // not exclude.
-  Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::vector<LandmarkIdx> landmarks,
+  Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::span<const LandmarkIdx> landmarks,
                                      const std::optional<PosePrior>& prior) const;
 
   // A fix made more exact by what the query shows of these landmarks where it puts them: the same fix where
@@ -110,20 +112,20 @@ class Localizer {
   // Landmarks to match.
   struct Attempt {
     Scope scope = Scope::kAll;
-    std::vector<std::vector<LandmarkIdx>> landmarks;  // with each image, ascending
-    bool may_be_thinned = true;                       // where there is no work left for all of them
-    size_t num_landmarks() const;                     // with all of them together
+    PooledVector<PooledVector<LandmarkIdx>> landmarks;  // with each image, ascending
+    bool may_be_thinned = true;                         // where there is no work left for all of them
+    size_t num_landmarks() const;                       // with all of them together
   };
   struct FollowedUp;
   struct PlaceToTry;
-  static Attempt WithAllImages(Scope scope, std::vector<LandmarkIdx> landmarks, const Sighting& sighting);
+  static Attempt WithAllImages(Scope scope, std::span<const LandmarkIdx> landmarks, const Sighting& sighting);
   // `best`: what was found before.
   Result<Localization> LocalizeBetter(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                       Localization best) const;
   Status CheckImage(const cv::Mat& grey, const Camera& camera) const;
   // Errors: InvalidArgument where it is no pose.
   Status PutOnRig(const Pose& cam_from_rig, Query* query) const;
-  Result<Localization> LocalizeRigQueries(std::vector<Query> queries, const std::optional<PosePrior>& prior,
+  Result<Localization> LocalizeRigQueries(PooledVector<Query> queries, const std::optional<PosePrior>& prior,
                                           const std::optional<SensedUp>& up) const;
   // The prior of one of its cameras.
   PosePrior PriorOfImage(const PosePrior& prior, const Query& query) const;
@@ -132,16 +134,16 @@ class Localizer {
                               Localization localization) const;
   // And the error of the map's scale is added to its covariance.
   void PutInGivenFrame(Localization* fix) const;
-  Result<std::vector<Attempt>> MakeAttempts(const Sighting& sighting, const std::optional<PosePrior>& prior,
-                                            std::vector<ImageId>* candidate_ids) const;
+  Result<PooledVector<Attempt>> MakeAttempts(const Sighting& sighting, const std::optional<PosePrior>& prior,
+                                             std::vector<ImageId>* candidate_ids) const;
   Result<Localization> Try(const Sighting& sighting, const Attempt& attempt) const;
   // What a first pose, of these matches, leads to.
-  Result<FollowedUp> FollowUp(const Sighting& sighting, const std::vector<Correspondence>& matches,
+  Result<FollowedUp> FollowUp(const Sighting& sighting, std::span<const Correspondence> matches,
                               const PoseEstimate& first, int64_t max_num_guided) const;
   // The landmarks that the images should show at a pose with these inliers, ascending; so many at most.
-  Result<std::vector<LandmarkIdx>> LandmarksToLookFor(const Sighting& sighting,
-                                                      const std::vector<Correspondence>& inliers,
-                                                      const Pose& rig_from_world, int64_t max_num) const;
+  Result<PooledVector<LandmarkIdx>> LandmarksToLookFor(const Sighting& sighting,
+                                                       std::span<const Correspondence> inliers,
+                                                       const Pose& rig_from_world, int64_t max_num) const;
   // How many they may be where so many poses are followed up: of each as many, or what they lead to does not
   // compare.
   static int64_t MaxNumGuided(const Sighting& sighting, size_t num_poses);
@@ -151,17 +153,17 @@ class Localizer {
   // The fix of that of these first poses which leads to most, unless one at another place leads to nearly as
   // much.
   Result<Localization> Refine(const Sighting& sighting, const LandmarkSet& matched,
-                              const std::vector<Correspondence>& matches,
-                              const std::vector<PoseEstimate>& firsts, Localization localization) const;
+                              std::span<const Correspondence> matches, std::span<const PoseEstimate> firsts,
+                              Localization localization) const;
   // These poses, and where the camera would be in the places that look like theirs, unless the prior excludes
   // it.
-  Result<std::vector<PlaceToTry>> WithLookAlikes(const Sighting& sighting, const std::vector<Pose>& poses,
-                                                 const std::optional<PosePrior>& prior) const;
+  Result<PooledVector<PlaceToTry>> WithLookAlikes(const Sighting& sighting, std::span<const Pose> poses,
+                                                  const std::optional<PosePrior>& prior) const;
   // `best`, a fix or one of several places, unless look-alikes of these explain the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Sighting& sighting, const std::optional<PosePrior>& prior,
                                          Localization best) const;
   // A pose at another place that max_second_pose_ratio as many other matches agree on.
-  std::optional<PoseEstimate> SecondPose(const std::vector<PoseMeasurement>& measurements,
+  std::optional<PoseEstimate> SecondPose(std::span<const PoseMeasurement> measurements,
                                          const PoseEstimate& first, const std::optional<UpMeasurement>& up,
                                          WorkBudget* work) const;
   // How many landmarks an image may be matched with.

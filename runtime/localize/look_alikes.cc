@@ -1,8 +1,10 @@
 // The part of Localizer that tries the places which look like that of a fix.
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/accept.h"
@@ -16,7 +18,7 @@ namespace cairn {
 // A pose of the rig, and the survey images near each of its cameras.
 struct Localizer::PlaceToTry {
   Pose cam_from_world;
-  std::vector<std::vector<Candidate>> near;
+  PooledVector<PooledVector<Candidate>> near;
 };
 
 namespace {
@@ -31,10 +33,10 @@ struct LookAlikePose {
 
 }  // namespace
 
-Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
-    const Sighting& sighting, const std::vector<Pose>& poses, const std::optional<PosePrior>& prior) const {
+Result<PooledVector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
+    const Sighting& sighting, std::span<const Pose> poses, const std::optional<PosePrior>& prior) const {
   const Pose given_from_camera = map_->head().camera_from_given.Inverse();
-  std::vector<PlaceToTry> places;
+  PooledVector<PlaceToTry> places;
   const auto add = [&](const Pose& pose) -> Status {
     PlaceToTry place{pose, {}};
     for (const Query& query : sighting.images) {
@@ -55,11 +57,11 @@ Result<std::vector<Localizer::PlaceToTry>> Localizer::WithLookAlikes(
     return CenterErrorM(a, b) <= options_.retrieve.prior_distance_m &&
            RotationErrorDeg(a, b) <= options_.retrieve.prior_angle_deg;
   };
-  std::vector<LookAlikePose> found;
-  std::vector<double> weights(poses.size(), 0);  // of all cameras, at each
+  PooledVector<LookAlikePose> found;
+  PooledVector<double> weights(poses.size(), 0);  // of all cameras, at each
   for (int k = 0; k < sighting.num_images(); ++k) {
     const Query& query = sighting.images[k];
-    std::vector<int32_t> possible;  // by the prior
+    PooledVector<int32_t> possible;  // by the prior
     if (prior) {
       RetrieveOptions retrieve = options_.retrieve;
       retrieve.max_num_candidates = std::numeric_limits<int>::max();
@@ -110,9 +112,9 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
                                                   const std::optional<PosePrior>& prior,
                                                   Localization best) const {
   if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
-  const std::vector<Pose> poses =
-      best.has_fix() ? std::vector<Pose>{best.cam_from_world} : best.possible_poses;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<PlaceToTry> places, WithLookAlikes(sighting, poses, prior));
+  const std::span<const Pose> poses =
+      best.has_fix() ? std::span<const Pose>(&best.cam_from_world, 1) : best.possible_poses;
+  CAIRN_ASSIGN_OR_RETURN(const PooledVector<PlaceToTry> places, WithLookAlikes(sighting, poses, prior));
   if (places.size() == poses.size()) return best;
   // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
   // are among them, no match is much better than the next best.
@@ -121,7 +123,7 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Sighting& sighting,
   for (size_t i = 0; i < places.size(); ++i) {
     // Or numbers of matches do not compare.
     Attempt attempt{.scope = Scope::kImages, .may_be_thinned = false};
-    for (const std::vector<Candidate>& near : places[i].near) {
+    for (std::span<const Candidate> near : places[i].near) {
       CAIRN_ASSIGN_OR_RETURN(auto landmarks,
                              LandmarksOfImages(*map_, ImagesOf(near), kAnyNum, sighting.work));
       attempt.landmarks.push_back(std::move(landmarks));

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/camera/pixel_ray.h"
 #include "core/features/descriptor_distance.h"
@@ -65,8 +67,8 @@ class KeypointGrid {
   double cell_px_;
   int num_columns_ = 0;
   int num_rows_ = 0;
-  std::vector<uint32_t> first_of_cell_;  // in keypoints_; one more than there are cells
-  std::vector<KeypointIdx> keypoints_;   // by cell
+  PooledVector<uint32_t> first_of_cell_;  // in keypoints_; one more than there are cells
+  PooledVector<KeypointIdx> keypoints_;   // by cell
 };
 
 bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
@@ -125,7 +127,7 @@ class GuidedSearch {
   }
 
   // Each as far beside its projection as so many times its radius, where that is in the image.
-  std::vector<Correspondence> Match(const Eigen::Vector2d& moved_in_radii) const {
+  PooledVector<Correspondence> Match(const Eigen::Vector2d& moved_in_radii) const {
     const double focal_px = query_.camera.MeanFocal();
     const DescriptorSpace& space = query_.packed.space();
     const double min_dot = DotAtAngle(options_.guided_max_angle_rad, space);
@@ -133,7 +135,7 @@ class GuidedSearch {
       int32_t dot = -1;
       LandmarkIdx landmark = 0;
     };
-    std::vector<Best> best_of_keypoint(query_.features.keypoints.size());
+    PooledVector<Best> best_of_keypoint(query_.features.keypoints.size());
     size_t num_found = 0;
     for (const ProjectedLandmark& at : projected_) {
       const Eigen::Vector2d pixel = at.pixel + at.radius_px * moved_in_radii;
@@ -155,7 +157,7 @@ class GuidedSearch {
       if (known.dot < 0) ++num_found;
       if (best.first > known.dot) known = {best.first, landmarks_.idx[at.k]};
     }
-    std::vector<Correspondence> correspondences;
+    PooledVector<Correspondence> correspondences;
     correspondences.reserve(num_found);
     for (size_t i = 0; i < best_of_keypoint.size(); ++i) {
       if (best_of_keypoint[i].dot >= 0)
@@ -169,7 +171,7 @@ class GuidedSearch {
   const LandmarkSet& landmarks_;
   const MatchOptions& options_;
   KeypointGrid grid_;
-  std::vector<ProjectedLandmark> projected_;
+  PooledVector<ProjectedLandmark> projected_;
 };
 
 }  // namespace
@@ -224,23 +226,23 @@ OptionTable DescribeOptions(MatchOptions* o) {
   return table;
 }
 
-std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
-                                           const MatchOptions& options) {
+PooledVector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
+                                            const MatchOptions& options) {
   const DescriptorMatcherOptions matcher_options{
       .max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad, .mutual = true};
   if (!Spend(query.work.get(), Work::kDescriptorPair, query.features.keypoints.size() * landmarks.idx.size()))
     return {};
-  std::vector<Correspondence> correspondences;
+  PooledVector<Correspondence> correspondences;
   for (const Match& match : MatchDescriptors(query.packed, landmarks.packed, matcher_options)) {
     if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks.idx[match.idx2]});
   }
   return correspondences;
 }
 
-Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                                    const MatchOptions& options, int64_t max_num,
-                                                    WorkBudget* work) {
-  std::vector<int32_t> image_blocks;  // those that a landmark's block names
+Result<PooledVector<LandmarkIdx>> CovisibleLandmarks(const Map& map, std::span<const LandmarkIdx> seen,
+                                                     const MatchOptions& options, int64_t max_num,
+                                                     WorkBudget* work) {
+  PooledVector<int32_t> image_blocks;  // those that a landmark's block names
   int64_t ordinal = -1;
   for (const LandmarkIdx landmark : seen) {
     const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
@@ -250,17 +252,18 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
     image_blocks.insert(image_blocks.end(), block->image_blocks.begin(), block->image_blocks.end());
   }
   SortUnique(&image_blocks);
-  std::vector<std::pair<int, int32_t>> order;
+  PooledVector<std::pair<int, int32_t>> order;
   for (const int32_t image_block : image_blocks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));
     for (size_t i = 0; i < block->images.size(); ++i) {
-      if (!Spend(work, Work::kListed, block->images[i].landmarks.size() + seen.size())) return seen;
+      if (!Spend(work, Work::kListed, block->images[i].landmarks.size() + seen.size()))
+        return PooledVector<LandmarkIdx>(seen.begin(), seen.end());
       const int num_shared = NumShared(block->images[i].landmarks, seen);
       if (num_shared > 0) order.emplace_back(-num_shared, block->first + static_cast<int32_t>(i));
     }
   }
   std::sort(order.begin(), order.end());
-  std::vector<LandmarkIdx> landmarks = seen;
+  PooledVector<LandmarkIdx> landmarks(seen.begin(), seen.end());
   for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
     if (i > 0 && static_cast<int64_t>(landmarks.size() + image->landmarks.size()) > max_num) break;
@@ -270,12 +273,12 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
   return landmarks;
 }
 
-std::vector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
-                                        const Pose& rig_from_world, const MatchOptions& options) {
-  std::vector<Correspondence> matches;
+PooledVector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
+                                         const Pose& rig_from_world, const MatchOptions& options) {
+  PooledVector<Correspondence> matches;
   for (int image = 0; image < sighting.num_images(); ++image) {
     const Query& query = sighting.images[image];
-    std::vector<Correspondence> of_image =
+    PooledVector<Correspondence> of_image =
         GuidedSearch(query, landmarks, query.cam_from_rig * rig_from_world, options).Match({0, 0});
     for (Correspondence& match : of_image) match.image = image;
     if (matches.empty()) {
@@ -302,14 +305,14 @@ GuidedMatches MatchGuidedInRounds(const Sighting& sighting, const LandmarkSet& l
                      estimate_options, refine_options, kRansacSeed, sighting.up, sighting.work);
     if (!estimate) break;
     pose = estimate->cam_from_world;
-    std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, pose, options);
+    PooledVector<Correspondence> matches = MatchGuided(sighting, landmarks, pose, options);
     if (matches.size() > best.matches.size()) best = {std::move(matches), pose};
   }
   for (int round = 1; round < options.guided_max_num_rounds; ++round) {
     const auto refined = RefinePose(MakeMeasurements(sighting, landmarks, best.matches), best.cam_from_world,
                                     refine_options, sighting.up, sighting.work);
     if (!refined) break;
-    std::vector<Correspondence> matches = MatchGuided(sighting, landmarks, *refined, options);
+    PooledVector<Correspondence> matches = MatchGuided(sighting, landmarks, *refined, options);
     if (matches.size() <= best.matches.size()) break;
     best = {std::move(matches), *refined};
   }

@@ -2,8 +2,9 @@
 
 #include <cstdint>
 #include <limits>
-#include <vector>
+#include <span>
 
+#include "core/base/pooled.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/estimate.h"
 #include "runtime/localize/localizer_options.h"
@@ -15,26 +16,26 @@ namespace cairn {
 
 // Correspondences between an image and these landmarks, by mutual nearest descriptors and ratio test,
 // ascending by keypoint.  REQUIRES: landmarks.packed
-std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
-                                           const MatchOptions& options);
+PooledVector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
+                                            const MatchOptions& options);
 
 // Landmarks that should be visible given these (ascending): those seen in the survey images that share most
 // of them, ascending; of so many of these images that they are no more than max_num, or of one.  Errors: as
 // Map::Landmarks.
-Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                                    const MatchOptions& options,
-                                                    int64_t max_num = std::numeric_limits<int64_t>::max(),
-                                                    WorkBudget* work = nullptr);
+Result<PooledVector<LandmarkIdx>> CovisibleLandmarks(const Map& map, std::span<const LandmarkIdx> seen,
+                                                     const MatchOptions& options,
+                                                     int64_t max_num = std::numeric_limits<int64_t>::max(),
+                                                     WorkBudget* work = nullptr);
 
 // Correspondences of landmarks with keypoints near their projections at a pose: per landmark and image the
 // keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by image, then
 // by keypoint.
-std::vector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
-                                        const Pose& rig_from_world, const MatchOptions& options);
+PooledVector<Correspondence> MatchGuided(const Sighting& sighting, const LandmarkSet& landmarks,
+                                         const Pose& rig_from_world, const MatchOptions& options);
 
 // What guided matching found, and the pose at which it looked.
 struct GuidedMatches {
-  std::vector<Correspondence> matches;
+  PooledVector<Correspondence> matches;
   Pose cam_from_world;  // of a rig: rig_from_world
 };
 

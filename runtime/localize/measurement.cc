@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/localization.h"
 #include "runtime/localize/refine.h"
@@ -27,9 +28,9 @@ std::optional<Eigen::Matrix2d> PixelFromRay(const Camera& camera, const Eigen::V
   return jacobian;
 }
 
-std::vector<std::optional<QueryRay>> RaysOf(const std::vector<Keypoint>& keypoints, const Camera& camera,
-                                            const MeasurementOptions& options) {
-  std::vector<std::optional<QueryRay>> rays(keypoints.size());
+PooledVector<std::optional<QueryRay>> RaysOf(std::span<const Keypoint> keypoints, const Camera& camera,
+                                             const MeasurementOptions& options) {
+  PooledVector<std::optional<QueryRay>> rays(keypoints.size());
   for (size_t i = 0; i < keypoints.size(); ++i) {
     const Keypoint& keypoint = keypoints[i];
     const auto direction = CameraFromImage(camera, {keypoint.x, keypoint.y});
@@ -141,17 +142,17 @@ int Sighting::num_features() const {
   return static_cast<int>(num);
 }
 
-std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
-  std::vector<LandmarkIdx> landmarks;
+PooledVector<LandmarkIdx> LandmarksOf(std::span<const Correspondence> correspondences) {
+  PooledVector<LandmarkIdx> landmarks;
   landmarks.reserve(correspondences.size());
   for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
   SortUnique(&landmarks);
   return landmarks;
 }
 
-std::vector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
-                                              const std::vector<Correspondence>& correspondences) {
-  std::vector<PoseMeasurement> measurements;
+PooledVector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
+                                               std::span<const Correspondence> correspondences) {
+  PooledVector<PoseMeasurement> measurements;
   measurements.reserve(correspondences.size());
   for (const Correspondence& correspondence : correspondences) {
     const MapLandmark& landmark = landmarks.Find(correspondence.landmark);

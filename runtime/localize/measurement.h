@@ -3,12 +3,12 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include <Eigen/Core>
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/base/pooled.h"
 #include "core/blocks/map_head.h"
 #include "core/camera/camera.h"
 #include "core/features/features.h"
@@ -54,8 +54,8 @@ struct UpMeasurement {
 struct Query {
   Features features;
   Camera camera;
-  std::vector<std::optional<QueryRay>> rays;  // per keypoint; none where the camera model has no forward ray
-  PackedDescriptors packed;                   // descriptors of the features that are matched
+  PooledVector<std::optional<QueryRay>> rays;  // per keypoint; none where the camera model has no forward ray
+  PackedDescriptors packed;                    // descriptors of the features that are matched
   // Features of smaller scales (sigma, px) were not looked for in all of the image, and what the image should
   // show of them is not missing.
   double min_scale_px = 0;
@@ -103,7 +103,7 @@ struct Correspondence {
 };
 
 // Their landmarks, ascending, each once.
-std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences);
+PooledVector<LandmarkIdx> LandmarksOf(std::span<const Correspondence> correspondences);
 
 // A correspondence with everything that pose estimation needs.
 struct PoseMeasurement {
@@ -125,7 +125,7 @@ struct PoseMeasurement {
   }
 };
 // REQUIRES: the keypoints have rays, the landmarks are in the set
-std::vector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
-                                              const std::vector<Correspondence>& correspondences);
+PooledVector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
+                                               std::span<const Correspondence> correspondences);
 
 }  // namespace cairn

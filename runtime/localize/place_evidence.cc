@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <utility>
-#include <vector>
 
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
@@ -30,11 +31,11 @@ double WeightOf(const NearView& view) { return 1 / (1 + view.squared_distance); 
 
 // What an image should show from there, by the survey images near.
 Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const Pose& cam_from_world,
-                                      const std::vector<NearView>& near,
-                                      const std::vector<LandmarkIdx>& found_idx, int num_cells) {
+                                      std::span<const NearView> near, std::span<const LandmarkIdx> found_idx,
+                                      int num_cells) {
   PlaceEvidence evidence{.squared_distance = near.front().squared_distance};
-  std::vector<std::shared_ptr<const MapImage>> images;
-  std::vector<LandmarkIdx> idx;
+  PooledVector<std::shared_ptr<const MapImage>> images;
+  PooledVector<LandmarkIdx> idx;
   double sum = 0;
   for (const NearView& view : near) {
     sum += WeightOf(view);
@@ -45,7 +46,7 @@ Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const 
   SortUnique(&idx);
   WorkBudget* const work = query.work.get();
   if (!Spend(work, Work::kLandmark, idx.size()) || !Spend(work, Work::kProject, idx.size())) return evidence;
-  std::vector<double> weights(idx.size(), 0);  // sums over the images that see it
+  PooledVector<double> weights(idx.size(), 0);  // sums over the images that see it
   for (size_t i = 0; i < images.size(); ++i) {
     size_t k = 0;
     for (const LandmarkIdx landmark : images[i]->landmarks) {  // ascending
@@ -53,8 +54,8 @@ Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const 
       weights[k] += WeightOf(near[i]);
     }
   }
-  CAIRN_ASSIGN_OR_RETURN(const auto expected, map.Gather(std::move(idx), false));
-  std::vector<char> cells_expected(static_cast<size_t>(num_cells) * num_cells), cells_found = cells_expected;
+  CAIRN_ASSIGN_OR_RETURN(const auto expected, map.Gather(idx, false));
+  PooledVector<char> cells_expected(static_cast<size_t>(num_cells) * num_cells), cells_found = cells_expected;
   for (size_t k = 0; k < expected->idx.size(); ++k) {
     const MapLandmark& landmark = expected->landmarks[k];
     const Eigen::Vector3d point = cam_from_world * landmark.position;
@@ -75,13 +76,13 @@ Result<PlaceEvidence> EvidenceOfImage(const Map& map, const Query& query, const 
 }  // namespace
 
 Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, const Pose& rig_from_world,
-                                      const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
+                                      const LandmarkSet& landmarks, std::span<const Correspondence> found,
                                       int num_matched, int num_cells) {
   PlaceEvidence evidence{.num_matched = num_matched};
   if (found.empty()) return evidence;
-  std::vector<double> depths;
+  PooledVector<double> depths;
   depths.reserve(found.size());
-  std::vector<std::vector<LandmarkIdx>> found_idx(sighting.images.size());  // by each image
+  PooledVector<PooledVector<LandmarkIdx>> found_idx(sighting.images.size());  // by each image
   for (const Correspondence& match : found) {
     const Query& query = sighting.images[match.image];
     const Eigen::Vector3d in_rig = rig_from_world * landmarks.Find(match.landmark).position;
@@ -90,12 +91,12 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, 
   }
   const ViewOptions one_view;
   const double radius_m = one_view.same_view_ratio * UpperMedian(std::move(depths));
-  std::vector<PlaceEvidence> of_images;
+  PooledVector<PlaceEvidence> of_images;
   for (int i = 0; i < sighting.num_images(); ++i) {
     const Query& query = sighting.images[i];
     const Pose cam_from_world = query.cam_from_rig * rig_from_world;
     CAIRN_ASSIGN_OR_RETURN(
-        const std::vector<NearView> near,
+        const PooledVector<NearView> near,
         NearestViews(map, cam_from_world, radius_m, one_view.same_view_deg, kNumNearViews, query.work.get()));
     if (near.empty()) return evidence;  // no work is left
     std::sort(found_idx[i].begin(), found_idx[i].end());

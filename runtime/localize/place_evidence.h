@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
@@ -31,7 +31,7 @@ struct PlaceEvidence {
 // `num_cells`: per side of the image.  Reads the nearest survey images only.  Errors: as Map::Landmarks.
 // REQUIRES: num_cells >= 1; the landmarks found are in the set
 Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Sighting& sighting, const Pose& rig_from_world,
-                                      const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
+                                      const LandmarkSet& landmarks, std::span<const Correspondence> found,
                                       int num_matched, int num_cells);
 
 // Odds that a pose with this evidence is right, and not of a place that is not in the map or of a part of

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/geometry/vector_geometry.h"
 #include "core/work/work_budget.h"
@@ -67,7 +69,7 @@ struct NormalEquations {
   Vector6d gradient = Vector6d::Zero();
   double cost = 0;
   int num_points = 0;
-  std::vector<Eigen::Matrix2d> informations;  // per measurement; zero behind the camera
+  PooledVector<Eigen::Matrix2d> informations;  // per measurement; zero behind the camera
   // Of images that are read row by row: how an error of the motion while that goes on moves the gradient, and
   // its standard deviations.
   Matrix6d of_readout = Matrix6d::Zero();
@@ -106,9 +108,9 @@ struct WeightedUp {
 };
 
 // `scale`: of the robust loss; infinity for plain least squares.
-NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
+NormalEquations BuildNormalEquations(std::span<const PoseMeasurement> measurements, const Pose& pose,
                                      double scale, const WeightedUp& up,
-                                     std::vector<Eigen::Matrix2d> memory = {}) {
+                                     PooledVector<Eigen::Matrix2d> memory = {}) {
   NormalEquations equations;
   equations.informations = std::move(memory);
   if (up.up) {
@@ -140,7 +142,7 @@ NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measure
 
 // The cost at another pose with the same weights of the measurements; infinite when a point went behind
 // the camera.
-double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEquations& equations,
+double CostAt(std::span<const PoseMeasurement> measurements, const NormalEquations& equations,
               const Pose& pose, double scale, const WeightedUp& up) {
   double cost = up.Cost(pose);
   for (size_t i = 0; i < measurements.size(); ++i) {
@@ -152,9 +154,8 @@ double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEqua
   return cost;
 }
 
-std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measurements, Pose pose,
-                                       double scale, int max_num_iterations, const WeightedUp& up,
-                                       WorkBudget* work) {
+std::optional<Pose> LevenbergMarquardt(std::span<const PoseMeasurement> measurements, Pose pose, double scale,
+                                       int max_num_iterations, const WeightedUp& up, WorkBudget* work) {
   double damping = 1e-6;
   NormalEquations equations;
   for (int iteration = 0; iteration < max_num_iterations && Spend(work, Work::kRefine, measurements.size());
@@ -184,17 +185,17 @@ std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measu
   return pose;
 }
 
-std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurements,
-                                    const std::vector<int>& indices) {
-  std::vector<PoseMeasurement> selected;
+PooledVector<PoseMeasurement> Select(std::span<const PoseMeasurement> measurements,
+                                     std::span<const int> indices) {
+  PooledVector<PoseMeasurement> selected;
   selected.reserve(indices.size());
   for (const int i : indices) selected.push_back(measurements[i]);
   return selected;
 }
 
 // Squared whitened residuals; infinite behind the camera.
-std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurements, const Pose& pose) {
-  std::vector<double> squares;
+PooledVector<double> WhitenedSquares(std::span<const PoseMeasurement> measurements, const Pose& pose) {
+  PooledVector<double> squares;
   squares.reserve(measurements.size());
   for (const PoseMeasurement& measurement : measurements) {
     const auto linearised = Linearise(measurement, pose);
@@ -207,7 +208,7 @@ std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurem
 
 // Noise variance from the median of squared residuals, most of which belong to inliers, corrected for the 6
 // fitted parameters.
-double VarianceFromMedian(const std::vector<double>& squares) {
+double VarianceFromMedian(const PooledVector<double>& squares) {
   constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
   const double num_residuals = 2.0 * static_cast<double>(squares.size());
   return std::max(1e-6,
@@ -226,8 +227,8 @@ double TruncationFactor(double limit) {
 }
 
 // With how many others of its image a measurement's keypoint errs together, on the mean.  REQUIRES: any
-double MeanNumInImage(const std::vector<PoseMeasurement>& measurements) {
-  std::vector<double> num_in_image;
+double MeanNumInImage(std::span<const PoseMeasurement> measurements) {
+  PooledVector<double> num_in_image;
   double sum = 0;
   for (const PoseMeasurement& measurement : measurements) {
     if (measurement.image >= std::ssize(num_in_image)) num_in_image.resize(measurement.image + 1);
@@ -303,7 +304,7 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to) {
   return xi;
 }
 
-std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
+std::optional<Pose> RefinePose(std::span<const PoseMeasurement> measurements, const Pose& initial,
                                const RefineOptions& options, const std::optional<UpMeasurement>& up,
                                WorkBudget* work) {
   return LevenbergMarquardt(measurements, initial, options.robust_scale, options.max_num_refine_iterations,
@@ -314,7 +315,7 @@ double UpErrorInSigmas(const UpMeasurement& up, const Pose& rig_from_world) {
   return LineariseUp(up, rig_from_world).angles.norm() / up.sigma_rad;
 }
 
-std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
+std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurement> measurements,
                                                     const Pose& initial, const RefineOptions& options,
                                                     const std::optional<UpMeasurement>& up,
                                                     WorkBudget* work) {
@@ -325,11 +326,11 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   RefinedPose refined;
   const double truncation = TruncationFactor(options.inlier_chi_square);
   // By how much keypoints' errors are larger than stated, those that they share among them.
-  const auto variance_unit = [&](const std::vector<PoseMeasurement>& used) {
+  const auto variance_unit = [&](std::span<const PoseMeasurement> used) {
     const double dispersion = 1 + 0.5 * MeanNumInImage(used) * options.keypoint_correlation;
     return options.covariance_scale * dispersion * truncation * refined.noise_variance;
   };
-  std::vector<double> squares = WhitenedSquares(measurements, *pose);
+  PooledVector<double> squares = WhitenedSquares(measurements, *pose);
   // The loss's scale is in units of the noise, which is known only now.
   refined.noise_variance = VarianceFromMedian(squares);
   pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
@@ -338,7 +339,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   squares = WhitenedSquares(measurements, *pose);
   refined.noise_variance = VarianceFromMedian(squares);
   for (int round = 0; round < 4; ++round) {
-    std::vector<int> inliers;
+    PooledVector<int> inliers;
     inliers.reserve(squares.size());
     for (size_t i = 0; i < squares.size(); ++i) {
       if (squares[i] <= options.inlier_chi_square * refined.noise_variance)
@@ -347,7 +348,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     if (inliers.size() < kMinNumInliers) return std::nullopt;
     if (round > 0 && inliers == refined.inliers) break;
     refined.inliers = std::move(inliers);
-    const std::vector<PoseMeasurement> used = Select(measurements, refined.inliers);
+    const PooledVector<PoseMeasurement> used = Select(measurements, refined.inliers);
     pose = LevenbergMarquardt(used, *pose, std::numeric_limits<double>::infinity(),
                               options.max_num_refine_iterations, {up, variance_unit(used)}, work);
     if (!pose) return std::nullopt;
@@ -358,7 +359,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
         std::max(1e-6, truncation * VarianceFromSum(sum, static_cast<int>(refined.inliers.size())));
     if (!std::isfinite(refined.noise_variance)) return std::nullopt;
   }
-  const std::vector<PoseMeasurement> used = Select(measurements, refined.inliers);
+  const PooledVector<PoseMeasurement> used = Select(measurements, refined.inliers);
   const double unit = variance_unit(used);
   const NormalEquations equations =
       BuildNormalEquations(used, *pose, std::numeric_limits<double>::infinity(), {up, unit});

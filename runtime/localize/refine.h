@@ -1,10 +1,11 @@
 #pragma once
 
 #include <optional>
-#include <vector>
+#include <span>
 
 #include <Eigen/Core>
 
+#include "core/base/pooled.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/localization.h"
 #include "runtime/localize/localizer_options.h"
@@ -22,7 +23,7 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to);
 // variance + landmark's covariance projected into the image, rho = Cauchy's loss; plus the square of up's
 // error where up is known.  Levenberg-Marquardt on 6 parameters.  Nothing when fewer than 3 points lie in
 // front of their camera or the normal equations are singular.
-std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
+std::optional<Pose> RefinePose(std::span<const PoseMeasurement> measurements, const Pose& initial,
                                const RefineOptions& options,
                                const std::optional<UpMeasurement>& up = std::nullopt,
                                WorkBudget* work = nullptr);
@@ -39,12 +40,12 @@ struct RefinedPose {
   // for the outliers left out.
   Matrix6d covariance = Matrix6d::Identity();
   double noise_variance = 1;  // of whitened residuals; 1: keypoints and landmarks are as accurate as stated
-  std::vector<int> inliers;   // indices of measurements, ascending
+  PooledVector<int> inliers;  // indices of measurements, ascending
 };
 
 // Refines robustly, then by least squares over the inliers, whose limit follows the noise found.
 // Nothing when fewer than 5 inliers are left or the geometry is degenerate.
-std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
+std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurement> measurements,
                                                     const Pose& initial, const RefineOptions& options,
                                                     const std::optional<UpMeasurement>& up = std::nullopt,
                                                     WorkBudget* work = nullptr);

@@ -5,8 +5,10 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "core/features/descriptor_distance.h"
@@ -25,8 +27,9 @@ double BoxDistance(const BlockEntry& entry, const Eigen::Vector3d& center) {
 }
 
 // Blocks of images, those first whose box is nearest to a place: at least so far, block.
-std::vector<std::pair<double, int64_t>> ImageBlocksByDistance(const Map& map, const Eigen::Vector3d& center) {
-  std::vector<std::pair<double, int64_t>> order;
+PooledVector<std::pair<double, int64_t>> ImageBlocksByDistance(const Map& map,
+                                                               const Eigen::Vector3d& center) {
+  PooledVector<std::pair<double, int64_t>> order;
   order.reserve(map.directory().NumBlocks(BlockKind::kImages));
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     order.emplace_back(BoxDistance(map.directory().Entry(BlockKind::kImages, ordinal), center), ordinal);
@@ -36,10 +39,10 @@ std::vector<std::pair<double, int64_t>> ImageBlocksByDistance(const Map& map, co
 }
 
 // Images by q . d / (|q| |d|), best first, ties by image; those with a score near enough to the best one's.
-std::vector<Candidate> BestImages(const std::vector<double>& dots, double query_norm,
-                                  const std::function<double(size_t)>& document_norm,
-                                  const RetrieveOptions& options) {
-  std::vector<Candidate> scored;
+PooledVector<Candidate> BestImages(std::span<const double> dots, double query_norm,
+                                   const std::function<double(size_t)>& document_norm,
+                                   const RetrieveOptions& options) {
+  PooledVector<Candidate> scored;
   for (size_t image = 0; image < dots.size(); ++image) {
     if (dots[image] <= 0) continue;
     // As float, so that the last bits of a sum in another order do not decide.
@@ -77,12 +80,12 @@ Result<Documents> DocumentsOf(const Map& map) {
   return documents;
 }
 
-Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query& query,
-                                                    const RetrieveOptions& options) {
+Result<PooledVector<Candidate>> RetrieveByVocabulary(const Map& map, const Query& query,
+                                                     const RetrieveOptions& options) {
   const DescriptorMatrix& descriptors = query.features.descriptors;
   CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
   CAIRN_ASSIGN_OR_RETURN(const auto norms, map.DocumentNorms());
-  std::vector<WordIdx> words(descriptors.rows());
+  PooledVector<WordIdx> words(descriptors.rows());
   for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
     words[i] = QuantizeDescriptor(*tree, descriptors.row(i).data());
   }
@@ -90,9 +93,9 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query&
 
   // Sums over the words in ascending order: the same for any order of the descriptors.
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
-  std::vector<double> dots(map.num_images(), 0.0);
+  PooledVector<double> dots(map.num_images(), 0.0);
   double squared_norm = 0;
-  if (!Spend(query.work.get(), Work::kPosting, map.num_images())) return std::vector<Candidate>();
+  if (!Spend(query.work.get(), Work::kPosting, map.num_images())) return PooledVector<Candidate>();
   std::shared_ptr<const WordBlock> block;
   for (size_t begin = 0, end = 0; begin < words.size(); begin = end) {
     const WordIdx word = words[begin];
@@ -100,9 +103,9 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query&
     if (!block || word >= block->first + static_cast<int64_t>(block->postings.size())) {
       CAIRN_ASSIGN_OR_RETURN(block, map.Words(map.directory().OrdinalOf(BlockKind::kWords, word)));
     }
-    const std::vector<Posting>& postings = block->postings[word - block->first];
+    std::span<const Posting> postings = block->postings[word - block->first];
     if (postings.empty()) continue;
-    if (!Spend(query.work.get(), Work::kPosting, postings.size())) return std::vector<Candidate>();
+    if (!Spend(query.work.get(), Work::kPosting, postings.size())) return PooledVector<Candidate>();
     // [Mariottini11 §IV] the query vector's entry, a word's count times its inverse document frequency
     const double idf = std::log(documents.count / static_cast<double>(postings.size()));
     const double query_weight = static_cast<double>(end - begin) * idf;
@@ -113,14 +116,14 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Query&
       dots, std::sqrt(squared_norm), [&](size_t image) { return (*norms)[image]; }, options);
 }
 
-Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& query,
-                                                   const RetrieveOptions& options) {
+Result<PooledVector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& query,
+                                                    const RetrieveOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto all, map.AllLandmarks());
-  std::vector<BestTwo> nearest, unused;
+  PooledVector<BestTwo> nearest, unused;
   FindBestTwo(query.packed, all->packed, &nearest, &unused);
   const DescriptorSpace& space = query.packed.space();
   const double min_dot = DotAtAngle(options.max_word_angle_rad, space);
-  std::vector<int> counts(all->idx.size(), 0);
+  PooledVector<int> counts(all->idx.size(), 0);
   for (const BestTwo& word : nearest) {
     if (word.idx < 0 || word.best < min_dot) continue;
     if (DescriptorAngleRad(word.best, space) <=
@@ -129,14 +132,14 @@ Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& 
   }
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
   // With the plus, a landmark that every image sees still counts: a map may have one image.
-  std::vector<double> idf(counts.size());
+  PooledVector<double> idf(counts.size());
   double squared_norm = 0;
   for (size_t i = 0; i < idf.size(); ++i) {
     idf[i] = std::log((static_cast<double>(map.num_images()) + 1) /
                       std::max(1, all->landmarks[i].num_observations));
     squared_norm += counts[i] * idf[i] * counts[i] * idf[i];
   }
-  std::vector<double> dots(map.num_images(), 0.0), squared_norms(map.num_images(), 0.0);
+  PooledVector<double> dots(map.num_images(), 0.0), squared_norms(map.num_images(), 0.0);
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
     for (size_t i = 0; i < block->images.size(); ++i) {
@@ -192,30 +195,30 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
   };
 }
 
-std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
-  std::vector<int32_t> images;
+PooledVector<int32_t> ImagesOf(std::span<const Candidate> candidates) {
+  PooledVector<int32_t> images;
   images.reserve(candidates.size());
   for (const Candidate& candidate : candidates) images.push_back(candidate.image);
   return images;
 }
 
-Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
-                                               const RetrieveOptions& options) {
+Result<PooledVector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
+                                                const RetrieveOptions& options) {
   const size_t num_features = query.features.keypoints.size();
   const bool may = map.has_words() ? Spend(query.work.get(), Work::kWord, num_features)
                                    : Spend(query.work.get(), Work::kDescriptorPair,
                                            num_features * static_cast<size_t>(map.num_landmarks()));
-  if (!may) return std::vector<Candidate>();
+  if (!may) return PooledVector<Candidate>();
   return map.has_words() ? RetrieveByVocabulary(map, query, options)
                          : RetrieveByLandmarks(map, query, options);
 }
 
-Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
-                                               const RetrieveOptions& options, WorkBudget* work) {
+Result<PooledVector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
+                                                const RetrieveOptions& options, WorkBudget* work) {
   const Pose cam_from_world = map.head().camera_from_given * prior.cam_from_world;
   const double max_distance = options.prior_distance_m + 3 * prior.sigma_m;
   const double max_angle = options.prior_angle_deg + 3 * prior.sigma_deg;
-  std::vector<Candidate> candidates;
+  PooledVector<Candidate> candidates;
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     if (BoxDistance(map.directory().Entry(BlockKind::kImages, ordinal), cam_from_world.Center()) >
         max_distance)
@@ -237,10 +240,10 @@ Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& 
   return candidates;
 }
 
-Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
-                                           double radius_deg, int max_num, WorkBudget* work) {
+Result<PooledVector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
+                                            double radius_deg, int max_num, WorkBudget* work) {
   const Eigen::Vector3d center = cam_from_world.Center();
-  std::vector<NearView> nearest;  // ascending
+  PooledVector<NearView> nearest;  // ascending
   nearest.reserve(static_cast<size_t>(std::min<int64_t>(max_num, map.num_images())) + 1);
   const auto is_nearer = [](const NearView& a, const NearView& b) {
     return std::pair(a.squared_distance, a.image) < std::pair(b.squared_distance, b.image);
@@ -270,9 +273,9 @@ Result<int32_t> ImageNearFix(const Map& map, const Localization& found) {
   return near.front().image;
 }
 
-Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
-                                                   const RetrieveOptions& options) {
-  std::vector<std::pair<RegionIdx, double>> votes;  // ascending
+Result<PooledVector<RegionIdx>> RegionsOfCandidates(const Map& map, std::span<const Candidate> candidates,
+                                                    const RetrieveOptions& options) {
+  PooledVector<std::pair<RegionIdx, double>> votes;  // ascending
   for (const Candidate& candidate : candidates) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(candidate.image));
     if (image->station < 0) continue;
@@ -291,7 +294,7 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
   std::sort(votes.begin(), votes.end(), [](const auto& a, const auto& b) {
     return std::pair(-a.second, a.first) < std::pair(-b.second, b.first);
   });
-  std::vector<RegionIdx> regions;
+  PooledVector<RegionIdx> regions;
   for (const auto& [region, vote] : votes) {
     if (static_cast<int>(regions.size()) == options.max_num_regions) break;
     regions.push_back(region);
@@ -299,12 +302,12 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
   return regions;
 }
 
-Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks,
-                                                 WorkBudget* work) {
-  std::vector<LandmarkIdx> ascending = landmarks;
+Result<PooledVector<RegionVotes>> VotesForRegions(const Map& map, std::span<const LandmarkIdx> landmarks,
+                                                  WorkBudget* work) {
+  PooledVector<LandmarkIdx> ascending(landmarks.begin(), landmarks.end());
   std::sort(ascending.begin(), ascending.end());
-  std::vector<RegionVotes> votes;
-  std::vector<LandmarkIdx> of_block;
+  PooledVector<RegionVotes> votes;
+  PooledVector<LandmarkIdx> of_block;
   for (auto first = ascending.begin(), end = first; first != ascending.end(); first = end) {
     CAIRN_ASSIGN_OR_RETURN(const auto block,
                            map.Landmarks(map.directory().OrdinalOf(BlockKind::kLandmarks, *first)));
@@ -312,7 +315,7 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
     of_block.assign(first, end);
     // [Sala06 §III] a vote for each region that it belongs to
     for (const auto& [region, of_region] : block->regions) {
-      if (!Spend(work, Work::kListed, of_region.size() + of_block.size())) return std::vector<RegionVotes>();
+      if (!Spend(work, Work::kListed, of_region.size() + of_block.size())) return PooledVector<RegionVotes>();
       const int num_shared = NumShared(of_region, of_block);
       if (num_shared > 0) votes.push_back({region, num_shared});
     }
@@ -334,15 +337,14 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
   return votes;
 }
 
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks,
-                                 WorkBudget* work) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, landmarks, work));
+Result<RegionIdx> RegionWithMost(const Map& map, std::span<const LandmarkIdx> landmarks, WorkBudget* work) {
+  CAIRN_ASSIGN_OR_RETURN(const PooledVector<RegionVotes> votes, VotesForRegions(map, landmarks, work));
   return votes.empty() ? -1 : votes.front().region;
 }
 
-Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions,
-                                                    WorkBudget* work) {
-  std::vector<LandmarkIdx> landmarks;
+Result<PooledVector<LandmarkIdx>> LandmarksOfRegions(const Map& map, std::span<const RegionIdx> regions,
+                                                     WorkBudget* work) {
+  PooledVector<LandmarkIdx> landmarks;
   for (const RegionIdx region : regions) {
     CAIRN_ASSIGN_OR_RETURN(const auto of_regions,
                            map.Regions(map.directory().OrdinalOf(BlockKind::kRegions, region)));
@@ -352,7 +354,7 @@ Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::v
           std::lower_bound(block->regions.begin(), block->regions.end(), region,
                            [](const auto& list, RegionIdx value) { return list.first < value; });
       if (found == block->regions.end() || found->first != region) continue;
-      if (!Spend(work, Work::kListed, found->second.size())) return std::vector<LandmarkIdx>();
+      if (!Spend(work, Work::kListed, found->second.size())) return PooledVector<LandmarkIdx>();
       landmarks.insert(landmarks.end(), found->second.begin(), found->second.end());
     }
   }
@@ -360,13 +362,13 @@ Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::v
   return landmarks;
 }
 
-Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images,
-                                                   int64_t max_num, WorkBudget* work) {
-  std::vector<LandmarkIdx> landmarks;
+Result<PooledVector<LandmarkIdx>> LandmarksOfImages(const Map& map, std::span<const int32_t> images,
+                                                    int64_t max_num, WorkBudget* work) {
+  PooledVector<LandmarkIdx> landmarks;
   for (const int32_t image : images) {
     CAIRN_ASSIGN_OR_RETURN(const auto row, map.Image(image));
     if (!landmarks.empty() && std::ssize(landmarks) + std::ssize(row->landmarks) > max_num) break;
-    if (!Spend(work, Work::kListed, row->landmarks.size())) return std::vector<LandmarkIdx>();
+    if (!Spend(work, Work::kListed, row->landmarks.size())) return PooledVector<LandmarkIdx>();
     landmarks.insert(landmarks.end(), row->landmarks.begin(), row->landmarks.end());
   }
   SortUnique(&landmarks);

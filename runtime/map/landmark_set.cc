@@ -1,6 +1,9 @@
 #include "runtime/map/landmark_set.h"
 
 #include <algorithm>
+#include <span>
+
+#include "core/base/pooled.h"
 
 namespace cairn {
 
@@ -8,12 +11,7 @@ size_t LandmarkSet::Position(LandmarkIdx landmark) const {
   return std::lower_bound(idx.begin(), idx.end(), landmark) - idx.begin();
 }
 
-void SortUnique(std::vector<LandmarkIdx>* landmarks) {
-  std::sort(landmarks->begin(), landmarks->end());
-  landmarks->erase(std::unique(landmarks->begin(), landmarks->end()), landmarks->end());
-}
-
-int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b) {
+int NumShared(std::span<const LandmarkIdx> a, std::span<const LandmarkIdx> b) {
   int num_shared = 0;
   for (size_t i = 0, j = 0; i < a.size() && j < b.size();) {
     num_shared += a[i] == b[j] ? 1 : 0;

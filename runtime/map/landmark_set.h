@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_rows.h"
 #include "core/features/packed_descriptors.h"
 
@@ -10,10 +13,10 @@ namespace cairn {
 
 // Some landmarks of a map, copied from its blocks for a query.
 struct LandmarkSet {
-  std::vector<LandmarkIdx> idx;        // ascending
-  std::vector<MapLandmark> landmarks;  // of each
-  DescriptorMatrix descriptors;        // row i: idx[i]
-  PackedDescriptors packed;            // the same, for matching; empty where the set is not matched
+  PooledVector<LandmarkIdx> idx;        // ascending
+  PooledVector<MapLandmark> landmarks;  // of each
+  DescriptorMatrix descriptors;         // row i: idx[i]
+  PackedDescriptors packed;             // the same, for matching; empty where the set is not matched
 
   // REQUIRES: the landmark is in the set
   const MapLandmark& Find(LandmarkIdx landmark) const { return landmarks[Position(landmark)]; }
@@ -21,8 +24,12 @@ struct LandmarkSet {
 };
 
 // Ascending, each once; of any indices.
-void SortUnique(std::vector<LandmarkIdx>* landmarks);
+template <typename Allocator>
+void SortUnique(std::vector<LandmarkIdx, Allocator>* landmarks) {
+  std::sort(landmarks->begin(), landmarks->end());
+  landmarks->erase(std::unique(landmarks->begin(), landmarks->end()), landmarks->end());
+}
 // How many elements two ascending lists share.
-int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b);
+int NumShared(std::span<const LandmarkIdx> a, std::span<const LandmarkIdx> b);
 
 }  // namespace cairn

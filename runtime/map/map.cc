@@ -5,11 +5,13 @@
 #include <limits>
 #include <numeric>
 #include <set>
+#include <span>
 #include <utility>
 
 #include <fmt/ranges.h>
 
 #include "core/base/no_throw.h"
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_layout.h"
 #include "core/blocks/map_rows.h"
@@ -271,10 +273,10 @@ Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {
   return std::shared_ptr<const MapImage>(block, &block->images[image - block->first]);
 }
 
-Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> landmarks,
+Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::span<const LandmarkIdx> landmarks,
                                                        bool packed) const {
-  auto set = std::make_shared<LandmarkSet>();
-  set->idx = std::move(landmarks);
+  auto set = std::allocate_shared<LandmarkSet>(PoolAllocator<LandmarkSet>());
+  set->idx.assign(landmarks.begin(), landmarks.end());
   set->landmarks.reserve(set->idx.size());
   const DescriptorKind& kind = directory().descriptor_kind();
   set->descriptors.resize(static_cast<Eigen::Index>(set->idx.size()), kind.num_values);
@@ -294,9 +296,9 @@ Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> 
 Result<std::shared_ptr<const LandmarkSet>> Map::AllLandmarks() const {
   if (auto found = store_->cache.Find(kAllLandmarks))
     return std::static_pointer_cast<const LandmarkSet>(found);
-  std::vector<LandmarkIdx> landmarks(num_landmarks());
+  PooledVector<LandmarkIdx> landmarks(num_landmarks());
   std::iota(landmarks.begin(), landmarks.end(), 0);
-  CAIRN_ASSIGN_OR_RETURN(auto set, Gather(std::move(landmarks), true));
+  CAIRN_ASSIGN_OR_RETURN(auto set, Gather(landmarks, true));
   const int64_t num_bytes = NumBytes(*set);
   return std::static_pointer_cast<const LandmarkSet>(
       store_->cache.Insert(kAllLandmarks, std::move(set), num_bytes));

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/base/pooled.h"
 #include "core/blocks/map_head.h"
 #include "core/camera/camera.h"
 #include "core/seal/signing_key.h"
@@ -109,7 +111,8 @@ class Map {
   Result<std::string> ImageName(int64_t image) const;
   Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;
   // These landmarks (ascending), packed for matching if asked.
-  Result<std::shared_ptr<const LandmarkSet>> Gather(std::vector<LandmarkIdx> landmarks, bool packed) const;
+  Result<std::shared_ptr<const LandmarkSet>> Gather(std::span<const LandmarkIdx> landmarks,
+                                                    bool packed) const;
   // All landmarks, packed.  Kept like a block.
   Result<std::shared_ptr<const LandmarkSet>> AllLandmarks() const;
 

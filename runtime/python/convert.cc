@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include "core/base/pooled.h"
 #include "core/features/features.h"
 #include "core/options/find_option.h"
 
@@ -94,7 +95,7 @@ std::string DtypeOf(const py::array& array) { return py::cast<std::string>(py::s
 
 }  // namespace
 
-std::vector<Keypoint> KeypointsOf(const py::array& keypoints) {
+PooledVector<Keypoint> KeypointsOf(const py::array& keypoints) {
   if (!AreFloats(keypoints))
     throw py::type_error(
         fmt::format("keypoints have dtype {}, expected floating-point numbers", DtypeOf(keypoints)));
@@ -105,7 +106,7 @@ std::vector<Keypoint> KeypointsOf(const py::array& keypoints) {
     throw py::value_error(
         fmt::format("keypoints have {} columns, expected 2 to 4: x, y, scale, orientation", columns));
   }
-  std::vector<Keypoint> found(static_cast<size_t>(values.shape(0)));
+  PooledVector<Keypoint> found(static_cast<size_t>(values.shape(0)));
   for (py::ssize_t i = 0; i < values.shape(0); ++i) {
     found[i] = {values(i, 0), values(i, 1), columns > 2 ? values(i, 2) : 0, columns > 3 ? values(i, 3) : 0};
     for (py::ssize_t k = 0; k < columns; ++k) {

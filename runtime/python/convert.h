@@ -9,6 +9,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "core/base/pooled.h"
 #include "core/seal/signing_key.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/track/camera_motion.h"
@@ -50,7 +51,7 @@ cv::Mat PixelsOf(const pybind11::array& image);
 
 // Of an array of floating-point numbers, n x 2, 3 or 4.  Throws a TypeError or a ValueError that says what
 // was found.
-std::vector<Keypoint> KeypointsOf(const pybind11::array& keypoints);
+PooledVector<Keypoint> KeypointsOf(const pybind11::array& keypoints);
 // Of an array of the map's kind: floating-point values, or bytes of SIFT or of bits.  Throws a TypeError for
 // another dtype, a ValueError for another shape or a value that is not finite.
 DescriptorMatrix DescriptorsOf(const pybind11::array& descriptors, const DescriptorKind& kind);

@@ -114,12 +114,12 @@ struct type_caster<cairn::PyRigImage> : ConstructedCaster<cairn::PyRigImage> {};
 namespace cairn {
 namespace {
 
-Camera MakeCamera(const std::string& model, int width, int height, std::vector<double> params) {
+Camera MakeCamera(const std::string& model, int width, int height, const std::vector<double>& params) {
   Camera camera;
   camera.model = ValueOrThrow(CameraModelFromName(model));
   camera.width = width;
   camera.height = height;
-  camera.params = std::move(params);
+  camera.params.assign(params.begin(), params.end());
   ThrowIfError(CheckCamera(camera));
   return camera;
 }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_rows.h"
 #include "core/camera/pixel_ray.h"
 #include "core/work/work_budget.h"
@@ -36,7 +38,7 @@ bool IsLike(const Keypoint& keypoint, const ExpectedSight& sight) {
 
 // Whether a keypoint is like one of these sights, which are ordered by column and whose radii are at most
 // this.
-bool IsLikeAny(const Keypoint& keypoint, const std::vector<ExpectedSight>& sights, double max_radius_px) {
+bool IsLikeAny(const Keypoint& keypoint, std::span<const ExpectedSight> sights, double max_radius_px) {
   const auto first = std::partition_point(sights.begin(), sights.end(), [&](const ExpectedSight& sight) {
     return sight.pixel.x() < keypoint.x - max_radius_px;
   });
@@ -48,9 +50,9 @@ bool IsLikeAny(const Keypoint& keypoint, const std::vector<ExpectedSight>& sight
 
 // Those that coarse features show: no others, as what is found of them is held against what should be
 // (PlaceEvidence).
-std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_from_world,
-                                  const Query& query) {
-  std::vector<LandmarkIdx> coarse;
+PooledVector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_from_world,
+                                   const Query& query) {
+  PooledVector<LandmarkIdx> coarse;
   coarse.reserve(landmarks.idx.size());
   for (size_t i = 0; i < landmarks.idx.size(); ++i) {
     const MapLandmark& landmark = landmarks.landmarks[i];
@@ -61,13 +63,13 @@ std::vector<LandmarkIdx> CoarseOf(const LandmarkSet& landmarks, const Pose& cam_
 }
 
 // Where the fix puts those that fine features show, ordered by column.
-std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Localization& fix,
-                                      const Pose& camera_from_given, const Query& coarse, double radius_px) {
+PooledVector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Localization& fix,
+                                       const Pose& camera_from_given, const Query& coarse, double radius_px) {
   constexpr double kNumSigmas = 3;
   const Pose cam_from_world = camera_from_given * fix.cam_from_world;
   const double sigma_rad = LargestSigma(fix.covariance.topLeftCorner<3, 3>());
   const double sigma_m = LargestSigma(fix.covariance.bottomRightCorner<3, 3>());
-  std::vector<ExpectedSight> sights;
+  PooledVector<ExpectedSight> sights;
   sights.reserve(landmarks.landmarks.size());
   const double focal_px = coarse.camera.MeanFocal();
   for (const MapLandmark& landmark : landmarks.landmarks) {
@@ -90,7 +92,7 @@ std::vector<ExpectedSight> FineSights(const LandmarkSet& landmarks, const Locali
 }  // namespace
 
 Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const QueryFrame& frame,
-                                      const std::vector<LandmarkIdx>& expected, const PosePrior& prior,
+                                      std::span<const LandmarkIdx> expected, const PosePrior& prior,
                                       const ExpectedFeaturesOptions& options) {
   if (!Spend(frame.work().get(), Work::kLandmark, expected.size()))
     return Localization{.reason = NoFix::kOverBudget, .message = "no work is left (budget_ms)"};
@@ -120,7 +122,7 @@ Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer
                               CoarseOf(*landmarks, camera_from_given * prior.cam_from_world, query), prior));
   if (!found.has_fix() || options.max_num_fine_features == 0) return found;
   query.readout = frame.ReadoutOf(found.cam_from_world);
-  const std::vector<ExpectedSight> sights =
+  const PooledVector<ExpectedSight> sights =
       FineSights(*landmarks, found, camera_from_given, query, options.fine_radius_px);
   CAIRN_RETURN_IF_ERROR(localizer.AddFineFeatures(
       *frame.image(), options.max_num_fine_features,

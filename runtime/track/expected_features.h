@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
@@ -14,7 +14,7 @@ namespace cairn {
 // more exact.  No fix where half of the landmarks' sizes are not known.  Errors: as Localizer::Localize.
 // REQUIRES: frame.image()
 Result<Localization> LocalizeExpected(const Map& map, const Localizer& localizer, const QueryFrame& frame,
-                                      const std::vector<LandmarkIdx>& expected, const PosePrior& prior,
+                                      std::span<const LandmarkIdx> expected, const PosePrior& prior,
                                       const ExpectedFeaturesOptions& options);
 
 }  // namespace cairn

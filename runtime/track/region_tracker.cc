@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/base/pooled.h"
 #include "core/work/work_budget.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
@@ -196,8 +198,8 @@ Result<Localization> RegionTracker::TrackQuery(const QueryFrame& frame, const Qu
       static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
   // [Sala06 §III] inside a region its features are tracked; here those of its neighbours too
   if (has_features && prior) {
-    CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera, query.work.get()));
-    CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeByRows(frame, query, std::move(expected), *prior));
+    CAIRN_ASSIGN_OR_RETURN(const auto expected, ExpectedLandmarks(*prior, query.camera, query.work.get()));
+    CAIRN_ASSIGN_OR_RETURN(Localization found, LocalizeByRows(frame, query, expected, *prior));
     if (found.has_fix() && Agrees(found, *prior)) {
       Update(found);
       return found;
@@ -217,16 +219,15 @@ Result<Localization> RegionTracker::TrackQuery(const QueryFrame& frame, const Qu
 }
 
 Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, const Query& query,
-                                                   std::vector<LandmarkIdx> expected,
+                                                   std::span<const LandmarkIdx> expected,
                                                    const PosePrior& prior) const {
-  if (options_.readout_ratio == 0)
-    return localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior);
+  if (options_.readout_ratio == 0) return localizer_.LocalizeAmong(query, Scope::kTrack, expected, prior);
   Query by_rows = query;
   by_rows.readout = frame.ReadoutOf(prior.cam_from_world);
   Spend(query.work.get(), Work::kLandmark, expected.size());
   CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map_->Gather(expected, false));
   CAIRN_ASSIGN_OR_RETURN(Localization found,
-                         localizer_.LocalizeAmong(by_rows, Scope::kTrack, std::move(expected), prior));
+                         localizer_.LocalizeAmong(by_rows, Scope::kTrack, expected, prior));
   if (!found.has_fix()) return found;
   // Now it is known how it moved.
   by_rows.readout = frame.ReadoutOf(found.cam_from_world);
@@ -235,14 +236,13 @@ Result<Localization> RegionTracker::LocalizeByRows(const QueryFrame& frame, cons
 
 Result<Localization> RegionTracker::FindLost(const Query& query) const {
   CAIRN_ASSIGN_OR_RETURN(Vote vote, VoteBy(query));
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> voted,
+  CAIRN_ASSIGN_OR_RETURN(PooledVector<LandmarkIdx> voted,
                          LandmarksOfRegions(*map_, vote.regions, query.work.get()));
   Localization found;
   if (!voted.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(
-        found, options_.votes.localize_when_lost
-                   ? localizer_.LocalizeVoted(query, std::move(voted))
-                   : localizer_.LocalizeAmong(query, Scope::kVotes, std::move(voted), std::nullopt));
+    CAIRN_ASSIGN_OR_RETURN(found, options_.votes.localize_when_lost
+                                      ? localizer_.LocalizeVoted(query, voted)
+                                      : localizer_.LocalizeAmong(query, Scope::kVotes, voted, std::nullopt));
   } else if (options_.votes.localize_when_lost) {
     CAIRN_ASSIGN_OR_RETURN(found, localizer_.LocalizeQuery(query, std::nullopt));
   } else {
@@ -254,17 +254,17 @@ Result<Localization> RegionTracker::FindLost(const Query& query) const {
   return found;
 }
 
-Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrior& prior,
-                                                                  const Camera& camera,
-                                                                  WorkBudget* work) const {
+Result<PooledVector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrior& prior,
+                                                                   const Camera& camera,
+                                                                   WorkBudget* work) const {
   const RetrieveOptions& retrieve = localizer_.options().retrieve;
   CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, prior, retrieve, work));
-  CAIRN_ASSIGN_OR_RETURN(std::vector<RegionIdx> regions, RegionsOfCandidates(*map_, near, retrieve));
+  CAIRN_ASSIGN_OR_RETURN(PooledVector<RegionIdx> regions, RegionsOfCandidates(*map_, near, retrieve));
   std::erase(regions, region_);
   if (static_cast<int>(regions.size()) > options_.max_num_neighbour_regions)
     regions.resize(options_.max_num_neighbour_regions);
   if (region_ >= 0) regions.push_back(region_);
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions, work));
+  CAIRN_ASSIGN_OR_RETURN(PooledVector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions, work));
   if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
     CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, ImagesOf(near), kAnyNum, work));
     landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
@@ -276,9 +276,9 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   if (!corner) return landmarks;
   const double half_view = std::atan2(corner->head<2>().norm(), corner->z()) +
                            RadFromDeg(options_.max_num_sigmas * prior.sigma_deg);
-  if (!Spend(work, Work::kLandmark, landmarks.size())) return std::vector<LandmarkIdx>();
+  if (!Spend(work, Work::kLandmark, landmarks.size())) return PooledVector<LandmarkIdx>();
   CAIRN_ASSIGN_OR_RETURN(const auto set, map_->Gather(landmarks, false));
-  std::vector<LandmarkIdx> in_view;
+  PooledVector<LandmarkIdx> in_view;
   in_view.reserve(set->idx.size());
   for (size_t i = 0; i < set->idx.size(); ++i) {
     const Eigen::Vector3d point = cam_from_world * set->landmarks[i].position;
@@ -303,7 +303,7 @@ Result<Vote> RegionTracker::VoteBy(const Query& query) const {
                                        map_->num_landmarks(), max_num_landmarks)};
   }
   CAIRN_ASSIGN_OR_RETURN(const auto all, map_->AllLandmarks());
-  std::vector<LandmarkIdx> visible;
+  PooledVector<LandmarkIdx> visible;
   for (const Correspondence& match : MatchLandmarks(query, *all, localizer_.options().match)) {
     visible.push_back(match.landmark);
   }

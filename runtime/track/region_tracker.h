@@ -2,8 +2,9 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
+#include <span>
 
+#include "core/base/pooled.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/track/camera_motion.h"
 #include "runtime/track/region_votes.h"
@@ -93,12 +94,12 @@ class RegionTracker {
                                   const std::optional<PosePrior>& prior);
   // Among these landmarks, with each row where it was read.
   Result<Localization> LocalizeByRows(const QueryFrame& frame, const Query& query,
-                                      std::vector<LandmarkIdx> expected, const PosePrior& prior) const;
+                                      std::span<const LandmarkIdx> expected, const PosePrior& prior) const;
   // Found by the prediction, without the features of all of the image; nothing if not.
   Result<std::optional<Localization>> TrackExpected(const QueryFrame& frame, const PosePrior& prior);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
-  Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera,
-                                                     WorkBudget* work) const;
+  Result<PooledVector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera,
+                                                      WorkBudget* work) const;
   // The visible landmarks vote for their regions.
   Result<Vote> VoteBy(const Query& query) const;
   Result<Localization> FindLost(const Query& query) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "core/blocks/map_blocks.h"
@@ -35,7 +36,7 @@ OptionTable DescribeOptions(VoteOptions* o) {
 }
 
 Result<int> MostInView(const Map& map, RegionIdx region, WorkBudget* work) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(map, {region}, work));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, LandmarksOfRegions(map, std::span(&region, 1), work));
   std::set<int32_t> image_blocks;
   for (const LandmarkIdx landmark : landmarks) {
     CAIRN_ASSIGN_OR_RETURN(const auto block,
@@ -53,9 +54,9 @@ Result<int> MostInView(const Map& map, RegionIdx region, WorkBudget* work) {
   return most;
 }
 
-Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen, const VoteOptions& options,
+Result<Vote> VoteForRegions(const Map& map, std::span<const LandmarkIdx> seen, const VoteOptions& options,
                             WorkBudget* work) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, seen, work));
+  CAIRN_ASSIGN_OR_RETURN(const auto votes, VotesForRegions(map, seen, work));
   Vote vote;
   if (votes.empty()) {
     vote.message = fmt::format("none of the {} landmarks in view belongs to a region", seen.size());

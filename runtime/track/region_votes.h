@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,7 +46,7 @@ struct Vote {
   std::string message;             // without candidates: what was found and needed
 };
 // Errors: as MostInView.
-Result<Vote> VoteForRegions(const Map& map, const std::vector<LandmarkIdx>& seen, const VoteOptions& options,
+Result<Vote> VoteForRegions(const Map& map, std::span<const LandmarkIdx> seen, const VoteOptions& options,
                             WorkBudget* work = nullptr);
 
 }  // namespace cairn

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/base/no_throw.h"
@@ -291,7 +292,7 @@ Result<std::vector<SeenLandmark>> VisualMap::Match(const Query& query) const {
 }
 
 Result<std::vector<SeenLandmark>> VisualMap::MatchAmong(const Query& query,
-                                                        std::vector<LandmarkIdx> landmarks) const {
+                                                        std::span<const LandmarkIdx> landmarks) const {
   if (!source_) {
     CAIRN_ASSIGN_OR_RETURN(std::vector<SeenLandmark> seen, Match(query));
     std::erase_if(seen, [&](const SeenLandmark& match) {
@@ -299,7 +300,7 @@ Result<std::vector<SeenLandmark>> VisualMap::MatchAmong(const Query& query,
     });
     return seen;
   }
-  CAIRN_ASSIGN_OR_RETURN(const auto some, source_->map->Gather(std::move(landmarks), true));
+  CAIRN_ASSIGN_OR_RETURN(const auto some, source_->map->Gather(landmarks, true));
   return MatchWith(query, *some);
 }
 

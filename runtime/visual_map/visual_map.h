@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -129,7 +130,8 @@ class VisualMap {
   // (ascending), ascending keypoint.  Errors: Unsupported for an image of another size than the survey's; as
   // Map::Landmarks.
   Result<std::vector<SeenLandmark>> Match(const Query& query) const;
-  Result<std::vector<SeenLandmark>> MatchAmong(const Query& query, std::vector<LandmarkIdx> landmarks) const;
+  Result<std::vector<SeenLandmark>> MatchAmong(const Query& query,
+                                               std::span<const LandmarkIdx> landmarks) const;
 
  private:
   // Where models come from that are not loaded, and those that are kept.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/base/pooled.h"
 #include "core/blocks/map_blocks.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/retrieve.h"
@@ -19,8 +20,8 @@ namespace {
 constexpr double kHalfSectorDeg = 45;
 constexpr double kLeastHeadingShare = 0.05;
 
-std::vector<LandmarkIdx> LandmarksOf(const std::vector<SeenLandmark>& seen) {
-  std::vector<LandmarkIdx> landmarks;
+PooledVector<LandmarkIdx> LandmarksOf(const std::vector<SeenLandmark>& seen) {
+  PooledVector<LandmarkIdx> landmarks;
   for (const SeenLandmark& match : seen) landmarks.push_back(match.landmark);
   SortUnique(&landmarks);
   return landmarks;
@@ -141,8 +142,8 @@ Result<std::optional<TrackedVisualPose>> VisualTracker::SeeTracked(const Query& 
   // [Sala06 §III] inside a region its features are tracked
   const std::vector<RegionIdx> regions = was_found_ ? RegionsOf(*filter) : std::vector<RegionIdx>();
   if (regions.empty()) return std::optional<TrackedVisualPose>();
-  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions));
-  CAIRN_ASSIGN_OR_RETURN(const auto seen, visual_->MatchAmong(query, std::move(landmarks)));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, LandmarksOfRegions(*map_, regions));
+  CAIRN_ASSIGN_OR_RETURN(const auto seen, visual_->MatchAmong(query, landmarks));
   VisualFilter tried = *filter;
   CAIRN_ASSIGN_OR_RETURN(VisualPose pose, tried.See(seen));
   if (pose.flag != VisualFlag::kNone) return std::optional<TrackedVisualPose>();

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/pooled.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
 #include "stages/decompose_regions/cover/reduced_world.h"
@@ -138,7 +139,7 @@ class Chooser {
       feature_classes.push_back(feature_class);
     }
     // The best of a descriptor among all is itself, or its equal.
-    std::vector<BestTwo> nearest, columns;
+    PooledVector<BestTwo> nearest, columns;
     FindBestTwo(descriptors, descriptors, space, FastestKernel(), &nearest, &columns);
     std::vector<Candidate> candidates;
     for (size_t i = 0; i < common.size(); ++i) {

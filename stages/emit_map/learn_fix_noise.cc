@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/camera/pixel_ray.h"
 #include "runtime/localize/refine.h"
@@ -131,7 +132,7 @@ class FixNoiseLearner {
     Features features;
     for (const auto& [measurement, keypoint] : measured_[image]) features.keypoints.push_back(keypoint);
     const Query query = MakeQuery(std::move(features), *cameras_.at(row.camera_id), {});
-    std::vector<PoseMeasurement> all;
+    PooledVector<PoseMeasurement> all;
     for (size_t i = 0; i < measured_[image].size(); ++i) {
       if (!query.rays[i]) continue;
       all.push_back(measured_[image][i].first);
@@ -140,7 +141,7 @@ class FixNoiseLearner {
     Tried tried{.run = RunOf(image), .placed = {}};
     for (size_t s = 0; s < kSteps.size(); ++s) {
       for (size_t first = 0; first < std::min<size_t>(2, kSteps[s]); ++first) {
-        std::vector<PoseMeasurement> some;
+        PooledVector<PoseMeasurement> some;
         for (size_t i = first; i < all.size(); i += kSteps[s]) some.push_back(all[i]);
         if (some.size() < kMinNumKeypoints) continue;
         const auto refined = RefinePoseWithCovariance(some, row.cam_from_world, {});

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "core/base/pooled.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/world/feature_class.h"
@@ -80,7 +81,7 @@ class LookAlikeSearch {
       }
       return;
     }
-    std::vector<BestTwo> row_bests, column_bests;
+    PooledVector<BestTwo> row_bests, column_bests;
     FindBestTwo(Centres(rows), Centres(columns), space_, FastestKernel(), &row_bests, &column_bests);
     // Rows with one look-alike are done; those with more are searched again, with the columns that may
     // be look-alikes.

@@ -5,8 +5,8 @@
 #include <limits>
 #include <map>
 
-#include "core/base/cancel_only.h"
 #include "core/base/parallel.h"
+#include "core/base/progress.h"
 #include "stages/link_appearance/dominating_set/domination.h"
 #include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
 

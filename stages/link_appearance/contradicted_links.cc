@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 
 namespace cairn::link_appearance {
@@ -38,8 +39,8 @@ class LinkTester {
     if (image1 == images_.end() || image2 == images_.end()) return false;
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Match> matches, MatchesOf(image_id1, image_id2));
     if (keypoints_.size() + 2 > kMaxNumKept) keypoints_.clear();
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint>* keypoints1, KeypointsOf(image_id1));
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint>* keypoints2, KeypointsOf(image_id2));
+    CAIRN_ASSIGN_OR_RETURN(const PooledVector<Keypoint>* keypoints1, KeypointsOf(image_id1));
+    CAIRN_ASSIGN_OR_RETURN(const PooledVector<Keypoint>* keypoints2, KeypointsOf(image_id2));
     int num_tested = 0, num_agreeing = 0;
     for (const Match& match : matches) {
       if (match.idx1 >= keypoints1->size() || match.idx2 >= keypoints2->size()) {
@@ -93,10 +94,10 @@ class LinkTester {
     return matches;
   }
 
-  Result<const std::vector<Keypoint>*> KeypointsOf(ImageId image_id) {
+  Result<const PooledVector<Keypoint>*> KeypointsOf(ImageId image_id) {
     const auto kept = keypoints_.find(image_id);
     if (kept != keypoints_.end()) return &kept->second;
-    CAIRN_ASSIGN_OR_RETURN(std::vector<Keypoint> keypoints, ReadDatabaseKeypoints(database_, image_id));
+    CAIRN_ASSIGN_OR_RETURN(PooledVector<Keypoint> keypoints, ReadDatabaseKeypoints(database_, image_id));
     return &(keypoints_[image_id] = std::move(keypoints));
   }
 
@@ -106,7 +107,7 @@ class LinkTester {
   SQLite::Statement query_;
   std::unordered_map<CameraId, const Camera*> cameras_;
   std::unordered_map<ImageId, PosedImage> images_;
-  std::unordered_map<ImageId, std::vector<Keypoint>> keypoints_;
+  std::unordered_map<ImageId, PooledVector<Keypoint>> keypoints_;
 };
 
 }  // namespace

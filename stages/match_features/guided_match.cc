@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/pose.h"
@@ -67,8 +68,8 @@ class KeypointChange {
     return keypoints2_[match.idx2].orientation - keypoints1_[match.idx1].orientation;
   }
 
-  const std::vector<Keypoint>& keypoints1_;
-  const std::vector<Keypoint>& keypoints2_;
+  const PooledVector<Keypoint>& keypoints1_;
+  const PooledVector<Keypoint>& keypoints2_;
   const double max_log_ratio_, max_turn_;
   double log_ratio_ = 0, turn_ = 0;
 };

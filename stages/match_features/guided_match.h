@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "core/base/pooled.h"
 #include "core/features/features.h"
 
 namespace cairn::match_features {
@@ -23,7 +24,7 @@ struct GuidedMatchOptions {
 // What guided matching reads of one image: row i of `descriptors` and bearing i (unit, NaN where there is
 // none) belong to keypoint i.
 struct GuidedView {
-  const std::vector<Keypoint>* keypoints = nullptr;
+  const PooledVector<Keypoint>* keypoints = nullptr;
   const std::vector<Eigen::Vector3d>* bearings = nullptr;
   const DescriptorMatrix* descriptors = nullptr;
   DescriptorSpace space;

@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 
 namespace cairn::match_features {
 namespace {
@@ -79,7 +80,7 @@ MatchedPair MatchPair(const MatchImages& images, const std::pair<int, int>& pair
   const MatchImage& image2 = images.images[pair.second];
   const ImageFeatures& features1 = *features.at(pair.first);
   const ImageFeatures& features2 = *features.at(pair.second);
-  const std::vector<Match> matches = MatchDescriptors(features1.packed, features2.packed, options.matcher);
+  const PooledVector<Match> matches = MatchDescriptors(features1.packed, features2.packed, options.matcher);
   MatchedPair result;
   result.num_putative = static_cast<int>(matches.size());
   result.geometry = VerifyPair(ForVerification(images, image1, features1),

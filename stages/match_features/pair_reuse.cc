@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "core/base/pooled.h"
 #include "core/features/hash_features.h"
 
 namespace cairn::match_features {
@@ -64,7 +65,7 @@ PairKeys::PairKeys(SQLite::Database& features, const MatchImages& images, const 
 Result<ContentHash> PairKeys::OfImage(int idx) {
   if (image_keys_[idx]) return *image_keys_[idx];
   const MatchImage& image = images_.images[idx];
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+  CAIRN_ASSIGN_OR_RETURN(const PooledVector<Keypoint> keypoints,
                          ReadDatabaseKeypoints(features_, image.image_id));
   CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
                          ReadDatabaseDescriptors(features_, image.image_id, images_.descriptor_kind));

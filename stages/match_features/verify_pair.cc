@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <Eigen/Dense>
 
@@ -30,7 +31,7 @@ struct Model {
 };
 
 Correspondences CollectCorrespondences(const ViewForVerification& view1, const ViewForVerification& view2,
-                                       const std::vector<Match>& matches) {
+                                       std::span<const Match> matches) {
   Correspondences c;
   for (size_t i = 0; i < matches.size(); ++i) {
     const Eigen::Vector3d& bearing1 = (*view1.bearings)[matches[i].idx1];
@@ -260,7 +261,7 @@ std::optional<Pose> StatedRelativePose(const std::optional<Pose>& cam1_from_worl
 }
 
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
-                           const std::vector<Match>& matches, const VerifyPairOptions& options) {
+                           std::span<const Match> matches, const VerifyPairOptions& options) {
   const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
   const Limits limits{options.max_epipolar_error_px / focal_px, options.max_homography_error_px / focal_px,
                       options.max_prior_error_px / focal_px};
@@ -271,7 +272,7 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
     return stated &&
            !CanMeet(*stated, (*view1.bearings)[match.idx1], (*view2.bearings)[match.idx2], limits, options);
   };
-  std::vector<Match> candidates = matches;
+  std::vector<Match> candidates(matches.begin(), matches.end());
   std::erase_if(candidates, cannot_meet);
   const Correspondences c = CollectCorrespondences(view1, view2, candidates);
   const bool has_intrinsics = view1.camera->has_focal_prior && view2.camera->has_focal_prior;

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/colmap/colmap_database.h"
 #include "core/features/features.h"
@@ -58,7 +60,7 @@ std::optional<Pose> StatedRelativePose(const std::optional<Pose>& cam1_from_worl
 // One image of the pair: camera, keypoints, and its stated pose if there is one.
 struct ViewForVerification {
   const Camera* camera = nullptr;
-  const std::vector<Keypoint>* keypoints = nullptr;
+  const PooledVector<Keypoint>* keypoints = nullptr;
   // Unit vector in the camera frame of every keypoint, NaN where undefined.
   const std::vector<Eigen::Vector3d>* bearings = nullptr;
   // Null: no guided matching.
@@ -90,6 +92,6 @@ struct ViewForVerification {
 // Without inliers: kDegenerate (fewer than asked for) or kWatermark.  Deterministic.
 // O(matches), O(n log n + candidates) with guided matching of n keypoints.
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
-                           const std::vector<Match>& matches, const VerifyPairOptions& options);
+                           std::span<const Match> matches, const VerifyPairOptions& options);
 
 }  // namespace cairn::match_features

@@ -1,4 +1,5 @@
 #include "stages/emit_map/learn_fix_noise.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 #include <optional>
@@ -94,7 +95,7 @@ double PartWithinBound(const Row& row, const Errors& errors, const RefineOptions
   for (int i = 0; i < kNum; ++i) {
     const Pose truth =
         PoseOf(random.Uniform(1, kSpacingM * static_cast<double>(row.classes.images.size()) - 1));
-    std::vector<PoseMeasurement> measurements;
+    PooledVector<PoseMeasurement> measurements;
     Features features;
     for (const auto& keypoint : See(points, row.rows.cameras[0], truth, errors, random))
       features.keypoints.push_back(keypoint ? *keypoint : Keypoint{});

@@ -1,4 +1,5 @@
 #include "stages/link_appearance/contradicted_links.h"
+#include "core/base/pooled.h"
 
 #include <cstdio>
 #include <string>
@@ -68,7 +69,8 @@ class TwoDoors : public testing::Test {
       for (size_t i = 0; i < images_.images.size(); ++i) {
         WriteDatabaseImage(database, images_.images[i]);
         Features features{.keypoints = keypoints_[i], .descriptors = {}};
-        features.descriptors.setZero(static_cast<Eigen::Index>(keypoints_[i].size()), kSiftDescriptorDim);
+        features.descriptors =
+            DescriptorMatrix::Zero(static_cast<Eigen::Index>(keypoints_[i].size()), kSiftDescriptorDim);
         WriteDatabaseFeatures(database, images_.images[i].image_id, features);
       }
       for (const AppearanceLink& link : images_.links) {
@@ -96,7 +98,7 @@ class TwoDoors : public testing::Test {
   std::string path_;
   Classes classes_;
   ImageLinks images_;
-  std::vector<std::vector<Keypoint>> keypoints_;  // per image
+  std::vector<PooledVector<Keypoint>> keypoints_;  // per image
 };
 
 TEST_F(TwoDoors, MatchesFromDoorToDoorContradictWhereTheImagesStand) {

@@ -209,7 +209,7 @@ TEST_F(MatchFeaturesTest, VocabularyWithoutWordsIsAnError) {
   Vocabulary vocabulary;
   vocabulary.nodes.resize(1);
   ASSERT_TRUE(NumberVocabularyNodes(&vocabulary).ok());
-  vocabulary.centres.setZero(1, kSiftDescriptorDim);
+  vocabulary.centres = DescriptorMatrix::Zero(1, kSiftDescriptorDim);
   ASSERT_TRUE(WriteVocabulary(vocabulary, folder_ + "/vocabulary.db").ok());
   options_.pairs = "retrieval";
   inputs_.vocabulary_path = folder_ + "/vocabulary.db";

@@ -1,4 +1,5 @@
 #include "stages/match_features/pairs/select_pairs.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 #include <random>
@@ -81,7 +82,7 @@ TEST(SelectPairs, OverlapOfAnImageWithItselfIsFull) {
 // Word by word what FrustumOverlapOptions says, on a pinhole camera.
 double OverlapByDefinition(const PosedCamera& image1, const PosedCamera& image2,
                            const FrustumOverlapOptions& options) {
-  const std::vector<double>& params = image2.camera.params;
+  const PooledVector<double>& params = image2.camera.params;
   const Eigen::Vector3d center1 = image1.cam_from_world.Center(), center2 = image2.cam_from_world.Center();
   int num_seen = 0;
   for (int i = 0; i < 150; ++i) {  // 6 columns, 5 rows, 5 depths

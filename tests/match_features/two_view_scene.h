@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "stages/match_features/verify_pair.h"
 
@@ -14,7 +15,7 @@ namespace cairn::match_features {
 struct TwoViewScene {
   Camera camera;
   Pose cam1_from_world, cam2_from_world;
-  std::vector<Keypoint> keypoints1, keypoints2;
+  PooledVector<Keypoint> keypoints1, keypoints2;
   std::vector<Eigen::Vector3d> bearings1, bearings2;
   DescriptorMatrix descriptors1, descriptors2;
   std::vector<Match> matches;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_model.h"
@@ -50,7 +51,7 @@ inline SyntheticSurvey MakeSyntheticSurvey(int num_images, uint64_t seed, const 
     rotation.row(1) = -Eigen::Vector3d::UnitZ();
     rotation.row(0) = Eigen::Vector3d(rotation.row(1)).cross(forward);
     Pose pose{Eigen::Quaterniond(rotation), -(rotation * centre)};
-    std::vector<Keypoint> keypoints;
+    PooledVector<Keypoint> keypoints;
     std::vector<int> shown;
     for (size_t p = 0; p < survey.points.size(); ++p) {
       const auto pixel = ImageFromCamera(survey.camera, pose * survey.points[p]);

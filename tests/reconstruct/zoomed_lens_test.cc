@@ -1,4 +1,5 @@
 #include "stages/reconstruct/zoomed_lens.h"
+#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +42,7 @@ MapperInput FilmOf(int num_images, bool is_flat, const Shown& shown) {
   }
   for (int i = 0; i < num_images; ++i) {
     film.images.push_back({static_cast<ImageId>(i + 1), fmt::format("{:02}.jpg", i), 1});
-    std::vector<Keypoint>& keypoints = film.keypoints.emplace_back();
+    PooledVector<Keypoint>& keypoints = film.keypoints.emplace_back();
     for (const Eigen::Vector3d& point : points) {
       const Eigen::Vector2d pixel = Eigen::Vector2d(320, 240) + shown(i, point);
       keypoints.push_back({.x = static_cast<float>(pixel.x() + random.Normal(0, kNoisePx)),
@@ -131,7 +132,7 @@ TEST(ZoomedLens, IsNoneBetweenTwoCameras) {
 
 TEST(ZoomedLens, IsToldDespiteMatchesThatAreWrong) {
   MapperInput film = FilmOf(8, false, Zoom);
-  for (std::vector<Keypoint>& keypoints : film.keypoints) {
+  for (PooledVector<Keypoint>& keypoints : film.keypoints) {
     for (size_t k = 0; k < 30; ++k)
       keypoints[k].x += static_cast<float>(7 * (k % 9) * (&keypoints - film.keypoints.data()));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/pooled.h"
 #include "pipeline/exchange/import/parts.h"
 
 namespace cairn::pipeline {
@@ -24,7 +25,7 @@ bool AreZero(const std::vector<double>& d, size_t first) {
 Result<Camera> Distorted(const CameraInfoMessage& camera_info, const Intrinsics& k, int width, int height) {
   const std::string& name = camera_info.distortion_model;
   const auto make = [&](CameraModel model, std::initializer_list<double> distortion) {
-    std::vector<double> params = {k.fx, k.fy, k.cx, k.cy};
+    PooledVector<double> params = {k.fx, k.fy, k.cx, k.cy};
     params.insert(params.end(), distortion.begin(), distortion.end());
     return CameraFromOpenCv(1, model, width, height, std::move(params));
   };

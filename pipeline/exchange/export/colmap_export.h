@@ -1,8 +1,8 @@
 #pragma once
 
 #include <map>
-#include <vector>
 
+#include "core/base/pooled.h"
 #include "core/blocks/map_rows.h"
 #include "core/colmap/colmap_model.h"
 #include "core/world/feature_class.h"
@@ -19,7 +19,7 @@ inline constexpr std::array<uint8_t, 3> kExportColor = {128, 128, 128};
 ColmapModel ModelFromMap(const MapRows& rows);
 
 // The keypoints of each image, by image_id, as in a features database.
-using ImageKeypoints = std::map<ImageId, std::vector<Keypoint>>;
+using ImageKeypoints = std::map<ImageId, PooledVector<Keypoint>>;
 
 // A survey's feature classes as a COLMAP model with full tracks: point_id = class_id + 1, keypoints as
 // observed.  With `keypoints` every keypoint of an image is in the model and its index is the database's;

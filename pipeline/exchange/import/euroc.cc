@@ -68,7 +68,7 @@ Result<Sensor> ReadCameraSensor(const std::string& path, CameraId camera_id, boo
     params.insert(params.end(), distortion.begin(), distortion.end());
     sensor.camera =
         CameraFromOpenCv(camera_id, is_radtan ? CameraModel::kOpenCv : CameraModel::kOpenCvFisheye,
-                         resolution[0], resolution[1], std::move(params));
+                         resolution[0], resolution[1], {params.begin(), params.end()});
     return sensor;
   });
 }

@@ -1,5 +1,6 @@
 #include "pipeline/exchange/import/parts.h"
 
+#include "core/base/pooled.h"
 #include "core/base/text.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/colmap_model.h"
@@ -53,7 +54,7 @@ Result<Pose> PoseFromNumbers(std::span<const double> numbers) {
 }
 
 Camera CameraFromOpenCv(CameraId camera_id, CameraModel model, int width, int height,
-                        std::vector<double> params) {
+                        PooledVector<double> params) {
   Camera camera;
   camera.camera_id = camera_id;
   camera.model = model;

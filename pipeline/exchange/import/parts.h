@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
 
@@ -33,7 +34,7 @@ Result<Pose> PoseFromNumbers(std::span<const double> numbers);
 
 // A camera whose principal point counts from the centre of the first pixel (OpenCV), in COLMAP's pixels.
 Camera CameraFromOpenCv(CameraId camera_id, CameraModel model, int width, int height,
-                        std::vector<double> params);
+                        PooledVector<double> params);
 
 // Width and height of an image, px.  Errors: as ReadGreyImage.
 struct ImageSize {

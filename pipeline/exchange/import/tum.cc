@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "core/base/pooled.h"
 #include "core/base/text.h"
 #include "core/files/file.h"
 #include "core/geometry/trajectory.h"
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 std::optional<Camera> KnownCamera(const std::string& source) {
   std::error_code error;
   const std::string path = fs::weakly_canonical(source, error).string();
-  const auto full = [](std::vector<double> params) {
+  const auto full = [](PooledVector<double> params) {
     params.insert(params.end(), {0, 0, 0});  // k4 k5 k6
     return CameraFromOpenCv(1, CameraModel::kFullOpenCv, 640, 480, std::move(params));
   };

@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "core/base/cancel_only.h"
+#include "core/base/progress.h"
 #include "stages/decompose_views/plan/check_rings.h"
 #include "stages/decompose_views/plan/join_walls.h"
 #include "stages/decompose_views/plan/node_segments.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/base/pooled.h"
 #include "core/camera/panorama.h"
 #include "core/capture/sessions.h"
 #include "core/features/descriptor_kind_table.h"
@@ -25,7 +26,7 @@ Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, con
   return counts;
 }
 
-std::vector<Eigen::Vector3d> BearingsOf(const std::vector<Keypoint>& keypoints, const Camera& camera) {
+std::vector<Eigen::Vector3d> BearingsOf(const PooledVector<Keypoint>& keypoints, const Camera& camera) {
   std::vector<Eigen::Vector3d> bearings;
   bearings.reserve(keypoints.size());
   for (const Keypoint& keypoint : keypoints) {
@@ -81,7 +82,8 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 int64_t ImageFeatures::NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors) {
   const int64_t row_bytes =
       sizeof(Keypoint) + sizeof(Eigen::Vector3d) + (has_descriptors ? kind.num_values : 0);
-  return PackedDescriptors::NumBytes(num_features, kind.num_values) + row_bytes * num_features;
+  return PackedDescriptors::NumBytes(num_features, kind.num_values) +
+         static_cast<int64_t>(PooledSize(row_bytes * num_features));
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
@@ -98,7 +100,7 @@ Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchI
 
 Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
                                                        const Camera& camera) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+  CAIRN_ASSIGN_OR_RETURN(const PooledVector<Keypoint> keypoints,
                          ReadDatabaseKeypoints(database, image.image_id));
   return BearingsOf(keypoints, camera);
 }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_database.h"
@@ -42,7 +43,7 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 
 // The features of one image, in the form that matching and verification use.
 struct ImageFeatures {
-  std::vector<Keypoint> keypoints;
+  PooledVector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
   DescriptorMatrix descriptors;           // for guided matching; without rows where there is none
   PackedDescriptors packed;

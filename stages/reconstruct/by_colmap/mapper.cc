@@ -4,6 +4,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "core/base/pooled.h"
 #include "core/files/write_error.h"
 #include "stages/reconstruct/by_colmap/run_program.h"
 
@@ -33,7 +34,7 @@ Status WriteMapperDatabase(const MapperInput& input, const MapperOptions& option
     SQLite::Statement keypoints_row(database, "INSERT INTO keypoints VALUES (?, ?, 4, ?)");
     for (size_t i = 0; i < input.images.size(); ++i) {
       WriteDatabaseImage(database, input.images[i]);
-      const std::vector<Keypoint>& keypoints = input.keypoints[i];
+      const PooledVector<Keypoint>& keypoints = input.keypoints[i];
       keypoints_row.bind(1, input.images[i].image_id);
       keypoints_row.bind(2, static_cast<int64_t>(keypoints.size()));
       keypoints_row.bind(3, keypoints.data(), static_cast<int>(keypoints.size() * sizeof(Keypoint)));

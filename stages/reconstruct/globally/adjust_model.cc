@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/camera/pixel_ray.h"
 #include "core/structure/bundle_blocks.h"
@@ -45,7 +46,7 @@ class CameraPriorCost : public ceres::CostFunction {
       residuals[i] =
           (camera_.camera.params[p] + parameters[0][i] - camera_.stated.params[p]) / camera_.sigma[i];
     }
-    const std::vector<double>& stated = camera_.stated.params;
+    const PooledVector<double>& stated = camera_.stated.params;
     if (has_aspect_) {
       residuals[n] = ((camera_.camera.params[0] + parameters[0][0]) / stated[0] -
                       (camera_.camera.params[1] + parameters[0][1]) / stated[1]) /

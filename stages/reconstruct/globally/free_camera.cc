@@ -1,5 +1,6 @@
 #include "stages/reconstruct/globally/free_camera.h"
 
+#include "core/base/pooled.h"
 #include "core/structure/camera_sensitivity.h"
 
 namespace cairn::reconstruct {
@@ -18,7 +19,7 @@ FreeCamera FreeOf(const Camera& stated, const MapGloballyOptions& options) {
   }
   if (stated.model == CameraModel::kEquirectangular) return camera;
   const int num_focals = NumFocals(camera.stated.model);
-  const std::vector<double>& params = camera.stated.params;
+  const PooledVector<double>& params = camera.stated.params;
   for (int p = 0; p < num_focals && options.refine_focal_length; ++p) {
     camera.free.push_back(p);
     camera.sigma.push_back(params[p] * (stated.has_focal_prior ? kStatedFocalSigma : kGuessedFocalSigma));

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/pooled.h"
 #include "runtime/localize/estimate.h"
 
 namespace cairn::reconstruct {
@@ -58,7 +59,7 @@ ImageFix FixImage(const PosedInput& posed, const SeenPoints& seen, int image, co
   features.descriptors =
       DescriptorMatrix::Zero(static_cast<Eigen::Index>(features.keypoints.size()), kSiftDescriptorDim);
   const Query query = MakeQuery(std::move(features), camera, {});
-  std::vector<PoseMeasurement> measurements;
+  PooledVector<PoseMeasurement> measurements;
   for (size_t k = 0; k < tracks.size(); ++k) {
     const auto ray = MakePixelRay(camera, posed.PixelOf({image, tracks[k].first}));
     if (!ray || !query.rays[k]) continue;

@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
+
+#include "core/base/pooled.h"
 
 namespace cairn::reconstruct {
 namespace {
 
 // How far nine of ten matched keypoints moved.  REQUIRES: matches
-double ShiftPx(const std::vector<Keypoint>& keypoints1, const std::vector<Keypoint>& keypoints2,
-               const std::vector<Match>& matches) {
+double ShiftPx(const PooledVector<Keypoint>& keypoints1, const PooledVector<Keypoint>& keypoints2,
+               std::span<const Match> matches) {
   std::vector<double> shifts;
   for (const Match& match : matches) {
     const Keypoint &a = keypoints1[match.idx1], &b = keypoints2[match.idx2];
@@ -34,7 +37,7 @@ std::vector<std::optional<RepeatedImage>> FindStandingImages(const MapperInput& 
     const int image1 = index.at(pair.image_id1), image2 = index.at(pair.image_id2);
     if (place[image1] < 0 || place[image2] < 0) continue;
     if (input.images[image1].camera_id != input.images[image2].camera_id) continue;
-    const std::vector<Keypoint>&keypoints1 = input.keypoints[image1], &keypoints2 = input.keypoints[image2];
+    const PooledVector<Keypoint>&keypoints1 = input.keypoints[image1], &keypoints2 = input.keypoints[image2];
     const auto fewer = static_cast<double>(std::min(keypoints1.size(), keypoints2.size()));
     if (pair.inliers.empty() || static_cast<double>(pair.inliers.size()) < options.min_matched_ratio * fewer)
       continue;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "core/colmap/colmap_database.h"
 
@@ -13,9 +14,9 @@ namespace cairn::reconstruct {
 // What the mapper reads of matches.db: no descriptors.
 struct MapperInput {
   std::map<CameraId, Camera> cameras;
-  std::vector<DatabaseImage> images;             // ascending image_id
-  std::vector<std::vector<Keypoint>> keypoints;  // per image
-  std::vector<TwoViewGeometry> geometries;       // pairs with at least kMinNumMatches inliers
+  std::vector<DatabaseImage> images;              // ascending image_id
+  std::vector<PooledVector<Keypoint>> keypoints;  // per image
+  std::vector<TwoViewGeometry> geometries;        // pairs with at least kMinNumMatches inliers
 };
 
 // Where each image stands in `images`.

@@ -1,4 +1,5 @@
 #include "core/camera/camera.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 
@@ -10,7 +11,7 @@
 namespace cairn {
 namespace {
 
-Camera MakeCamera(CameraModel model, std::vector<double> params) {
+Camera MakeCamera(CameraModel model, PooledVector<double> params) {
   Camera camera;
   camera.model = model;
   camera.width = 640;

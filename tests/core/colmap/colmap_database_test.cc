@@ -1,4 +1,5 @@
 #include "core/colmap/colmap_database.h"
+#include "core/base/pooled.h"
 
 #include <chrono>
 #include <cstdlib>
@@ -122,7 +123,7 @@ TEST_F(ColmapDatabase, EveryVersionsSchemaIsRead) {
     EXPECT_EQ(geometries->front().image_id2, 2u);
     EXPECT_THAT(geometries->front().inliers, testing::ElementsAre(Match{0, 1}, Match{1, 0}));  // ascending
     EXPECT_EQ(ReadDatabaseKeypoints(*database, 1)->at(0).x, 0.5f);
-    EXPECT_EQ(ReadDatabaseCameras(*database)->at(1).params, (std::vector<double>{500, 320, 240}));
+    EXPECT_EQ(ReadDatabaseCameras(*database)->at(1).params, (PooledVector<double>{500, 320, 240}));
   }
 }
 

@@ -1,4 +1,5 @@
 #include "core/colmap/cut_database.h"
+#include "core/base/pooled.h"
 
 #include <cstdio>
 #include <filesystem>
@@ -28,8 +29,8 @@ class CutDatabase : public testing::Test {
     WriteDatabaseCamera(database, *ParseCamera("PINHOLE,640,480,500,500,320,240"));
     for (ImageId image_id = 1; image_id <= 6; ++image_id) {
       WriteDatabaseImage(database, {image_id, std::to_string(image_id) + ".jpg", 1});
-      Features features{.keypoints = std::vector<Keypoint>(400, Keypoint{1, 2, 3, 0}), .descriptors = {}};
-      features.descriptors.setOnes(400, kSiftDescriptorDim);
+      Features features{.keypoints = PooledVector<Keypoint>(400, Keypoint{1, 2, 3, 0}), .descriptors = {}};
+      features.descriptors = DescriptorMatrix::Constant(400, kSiftDescriptorDim, 1);
       WriteDatabaseFeatures(database, image_id, features);
     }
   }

@@ -1,6 +1,8 @@
 #include "core/features/descriptor_matcher.h"
+#include "core/base/pooled.h"
 
 #include <gtest/gtest.h>
+#include <span>
 
 #include "core/base/random.h"
 
@@ -26,9 +28,9 @@ DescriptorMatrix RandomDescriptorsOf(const DescriptorSpace& space, int num, uint
 }
 
 // The definition, without any cleverness.  About an offset, what is at a right angle or more does not count.
-std::vector<BestTwo> OracleRows(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
-                                int offset = 0) {
-  std::vector<BestTwo> rows(descriptors1.rows());
+PooledVector<BestTwo> OracleRows(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
+                                 int offset = 0) {
+  PooledVector<BestTwo> rows(descriptors1.rows());
   for (int i = 0; i < descriptors1.rows(); ++i) {
     for (int j = 0; j < descriptors2.rows(); ++j) {
       const int dot = (descriptors1.row(i).cast<int>().array() - offset)
@@ -45,7 +47,7 @@ std::vector<BestTwo> OracleRows(const DescriptorMatrix& descriptors1, const Desc
   return rows;
 }
 
-void ExpectEqual(const std::vector<BestTwo>& found, const std::vector<BestTwo>& expected) {
+void ExpectEqual(std::span<const BestTwo> found, std::span<const BestTwo> expected) {
   ASSERT_EQ(found.size(), expected.size());
   for (size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].idx, expected[i].idx) << i;
@@ -77,7 +79,7 @@ TEST_P(FindBestTwoTest, EqualsBruteForceForAnySizeTiesIncluded) {
            {1, 255}) {  // values of 0 and 1 only: ties everywhere; 255: the largest products
         const DescriptorMatrix d1 = RandomDescriptors(num1, max_value, 1 + num1);
         const DescriptorMatrix d2 = RandomDescriptors(num2, max_value, 1000 + num2);
-        std::vector<BestTwo> rows, columns;
+        PooledVector<BestTwo> rows, columns;
         FindBestTwo(d1, d2, {}, GetParam(), &rows, &columns);
         ExpectEqual(rows, OracleRows(d1, d2));
         ExpectEqual(columns, OracleRows(d2, d1));
@@ -91,7 +93,7 @@ TEST_P(FindBestTwoTest, SaturatedAndZeroDescriptorsDoNotOverflow) {
   DescriptorMatrix d2 = DescriptorMatrix::Constant(40, kSiftDescriptorDim, 255);
   d1.row(3).setZero();
   d2.row(5).setZero();
-  std::vector<BestTwo> rows, columns;
+  PooledVector<BestTwo> rows, columns;
   FindBestTwo(d1, d2, {}, GetParam(), &rows, &columns);
   ExpectEqual(rows, OracleRows(d1, d2));
   ExpectEqual(columns, OracleRows(d2, d1));
@@ -105,7 +107,7 @@ TEST_P(FindBestTwoTest, SmallAndLargeValuesMixedFindTheSame) {
   d2.row(6) = d2.row(60);
   d2.row(5) = d2.row(50);
   d1.bottomRows(40) = d1.topRows(40);
-  std::vector<BestTwo> rows, columns;
+  PooledVector<BestTwo> rows, columns;
   FindBestTwo(d1, d2, {}, GetParam(), &rows, &columns);
   ExpectEqual(rows, OracleRows(d1, d2));
   ExpectEqual(columns, OracleRows(d2, d1));
@@ -117,7 +119,7 @@ TEST_P(FindBestTwoTest, ConcentratedDescriptorsDoNotOverflow) {
   for (int i = 0; i < 128; ++i) d1(i, i) = static_cast<uint8_t>(120 + i);
   for (int i = 128; i < d1.rows(); ++i) d1.row(i).setConstant(static_cast<uint8_t>(i - 80));
   const DescriptorMatrix d2 = d1.colwise().reverse();
-  std::vector<BestTwo> rows, columns;
+  PooledVector<BestTwo> rows, columns;
   FindBestTwo(d1, d2, {}, GetParam(), &rows, &columns);
   ExpectEqual(rows, OracleRows(d1, d2));
   ExpectEqual(columns, OracleRows(d2, d1));
@@ -132,7 +134,7 @@ TEST_P(FindBestTwoTest, BlocksBeyondTheKeysIndexAreMerged) {
   many.row(8400) = many.row(3);
   for (const auto& [d1, d2] : {std::pair(large1, large2), std::pair(saturated, large1), std::pair(few, many),
                                std::pair(many, few)}) {
-    std::vector<BestTwo> rows, columns;
+    PooledVector<BestTwo> rows, columns;
     FindBestTwo(d1, d2, {}, GetParam(), &rows, &columns);
     ExpectEqual(rows, OracleRows(d1, d2));
     ExpectEqual(columns, OracleRows(d2, d1));
@@ -154,7 +156,7 @@ TEST_P(FindBestTwoTest, OtherSpacesEqualBruteForceForAnyWidthAndSize) {
       const DescriptorMatrix d1 = RandomDescriptorsOf(space, size1, 1);
       DescriptorMatrix d2 = RandomDescriptorsOf(space, size2, 2);
       if (size1 > 1) d2.row(5) = d2.row(9) = d1.row(3);  // equal ones: the smaller index is the best
-      std::vector<BestTwo> rows, columns;
+      PooledVector<BestTwo> rows, columns;
       FindBestTwo(d1, d2, space, GetParam(), &rows, &columns);
       ExpectEqual(rows, OracleRows(d1, d2, space.offset));
       ExpectEqual(columns, OracleRows(d2, d1, space.offset));
@@ -169,7 +171,7 @@ TEST_P(FindBestTwoTest, ExtremeValuesOfOtherSpacesDoNotOverflow) {
     d1.row(4).setConstant(static_cast<uint8_t>(space.offset));  // in no direction: like none
     DescriptorMatrix d2 = DescriptorMatrix::Zero(35, space.num_values);
     d2.topRows(2).setConstant(255);
-    std::vector<BestTwo> rows, columns;
+    PooledVector<BestTwo> rows, columns;
     FindBestTwo(d1, d2, space, GetParam(), &rows, &columns);
     ExpectEqual(rows, OracleRows(d1, d2, space.offset));
     ExpectEqual(columns, OracleRows(d2, d1, space.offset));
@@ -181,7 +183,7 @@ TEST_P(FindBestTwoTest, ExtremeValuesOfOtherSpacesDoNotOverflow) {
 TEST_P(FindBestTwoTest, ManyDescriptorsOfOtherSpacesEqualBruteForce) {
   for (const DescriptorSpace& space : {kSpaces[1], kSpaces[6]}) {
     const DescriptorMatrix d1 = RandomDescriptorsOf(space, 30, 1), d2 = RandomDescriptorsOf(space, 2100, 2);
-    std::vector<BestTwo> rows, columns;
+    PooledVector<BestTwo> rows, columns;
     FindBestTwo(d1, d2, space, GetParam(), &rows, &columns);
     ExpectEqual(rows, OracleRows(d1, d2, space.offset));
     ExpectEqual(columns, OracleRows(d2, d1, space.offset));
@@ -212,7 +214,7 @@ TEST(MatchDescriptors, RatioTestDropsAmbiguousAndDistantMatches) {
   SetDirection(&d2, 1, 1, 0.30);  // two candidates for 1, too alike
   SetDirection(&d2, 2, 1, 0.32);
   SetDirection(&d2, 3, 2, 1.0);  // too far from 2
-  const std::vector<Match> matches = MatchDescriptors(d1, d2, {}, {});
+  const PooledVector<Match> matches = MatchDescriptors(d1, d2, {}, {});
   ASSERT_EQ(matches.size(), 1u);
   EXPECT_EQ(matches[0], (Match{0, 0}));
 }
@@ -266,7 +268,7 @@ TEST(PackedDescriptors, MatchLikeUnpackedOnesAndKeepToTheStatedMemory) {
   EXPECT_EQ(packed1.size(), 300);
   EXPECT_GE(packed1.num_bytes(), 300 * kSiftDescriptorDim);
   EXPECT_LE(packed1.num_bytes(), PackedDescriptors::NumBytes(300, kSiftDescriptorDim));
-  const std::vector<Match> matches = MatchDescriptors(packed1, packed2, {});
+  const PooledVector<Match> matches = MatchDescriptors(packed1, packed2, {});
   EXPECT_GE(matches.size(), 50u);
   EXPECT_EQ(matches, MatchDescriptors(d1, d2, {}, {}));
 }

@@ -16,7 +16,7 @@ mkdir -p "$work"
 compile() { "$compiler" -std=c++20 -O2 -ffp-contract=off -I"$source" -isystem "$eigen" -isystem "$googletest/include" "${@:2}" -c "$1" -o "$work/$(basename "$1").o"; }
 rm -f "$work"/*.o
 compile "$source/core/features/best_two_neon_dot.cc" -march=armv8.2-a+dotprod -Wall -Wextra -Werror
-for file in core/features/best_two_portable.cc core/features/descriptor_distance.cc core/features/descriptor_matcher.cc core/features/packed_descriptors.cc \
+for file in core/base/pooled.cc core/features/best_two_portable.cc core/features/descriptor_distance.cc core/features/descriptor_matcher.cc core/features/packed_descriptors.cc \
   tests/core/features/best_two_sweep_test.cc tests/core/features/descriptor_matcher_test.cc; do
   compile "$source/$file" -Wall -Wextra -Werror
 done

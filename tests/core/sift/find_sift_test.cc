@@ -1,7 +1,9 @@
 #include "core/sift/find_sift.h"
+#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -12,7 +14,7 @@
 namespace cairn {
 namespace {
 
-std::vector<SiftFeature> Find(const cv::Mat& grey, const SiftSearch& search = {}) {
+PooledVector<SiftFeature> Find(const cv::Mat& grey, const SiftSearch& search = {}) {
   return FindSift(grey, {}, search);
 }
 
@@ -52,7 +54,7 @@ struct Agreement {
   int num_theirs_found = 0;
   double sum_of_distances = 0;  // of the descriptors of those found
 };
-void Compare(const std::vector<SiftFeature>& ours, const Oracle& oracle, Agreement* agreement) {
+void Compare(std::span<const SiftFeature> ours, const Oracle& oracle, Agreement* agreement) {
   std::vector<bool> is_found(oracle.keypoints.size());
   for (const SiftFeature& f : ours) {
     for (size_t i = 0; i < oracle.keypoints.size(); ++i) {
@@ -105,7 +107,7 @@ TEST(FindSift, ValuesAreFiniteAndInOrder) {
   dot.at<uint8_t>(40, 40) = 255;
   for (const cv::Mat& grey :
        {Noise({200, 150}, 7), stripes, dot, cv::Mat(60, 60, CV_8UC1, cv::Scalar(255))}) {
-    const std::vector<SiftFeature> features = Find(grey);
+    const PooledVector<SiftFeature> features = Find(grey);
     for (const SiftFeature& f : features) {
       EXPECT_TRUE(std::isfinite(f.x + f.y + f.size + f.response));
       EXPECT_TRUE(f.angle_deg >= 0 && f.angle_deg < 360) << f.angle_deg;
@@ -121,7 +123,7 @@ TEST(FindSift, EveryInstructionSetGivesTheSameFeatures) {
   for (const cv::Mat& grey :
        {RandomBlobs({333, 247}, 400, 4), Noise({97, 61}, 1), Checkerboard({200, 300}, 17)}) {
     for (const bool doubled : {true, false}) {
-      const std::vector<SiftFeature> expected = FindSift(grey, {}, {.doubled = doubled}, kSiftPortable);
+      const PooledVector<SiftFeature> expected = FindSift(grey, {}, {.doubled = doubled}, kSiftPortable);
       EXPECT_GT(expected.size(), 15u);
       for (const SiftKernels* kernels : UsableSiftKernels())
         EXPECT_EQ(FindSift(grey, {}, {.doubled = doubled}, *kernels), expected) << kernels->name;
@@ -131,14 +133,14 @@ TEST(FindSift, EveryInstructionSetGivesTheSameFeatures) {
 
 TEST(FindSift, DoesNotDependOnThreadsOrOnImagesBefore) {
   const cv::Mat large = Noise({400, 300}, 1), small = RandomBlobs({150, 130}, 90, 6);
-  std::vector<SiftFeature> expected, after;
+  PooledVector<SiftFeature> expected, after;
   std::thread([&] { expected = Find(small); }).join();
   std::thread([&] {
     Find(large);  // leaves its levels in the thread's memory
     after = Find(small);
   }).join();
   EXPECT_EQ(after, expected);
-  std::vector<std::vector<SiftFeature>> at_once(4);
+  std::vector<PooledVector<SiftFeature>> at_once(4);
   std::vector<std::thread> threads;
   for (auto& features : at_once) threads.emplace_back([&] { features = Find(small); });
   for (std::thread& thread : threads) thread.join();
@@ -160,14 +162,14 @@ INSTANTIATE_TEST_SUITE_P(, FindSiftInPart, testing::Bool(),
 
 TEST_P(FindSiftInPart, FeaturesOfARegionAreThoseOfTheWholeImageThere) {
   const cv::Mat grey = RandomBlobs({720, 560}, 2500, 8);
-  const std::vector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
+  const PooledVector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
   size_t num_compared = 0;
   for (const cv::Rect region :
        {cv::Rect(300, 250, 60, 40), cv::Rect(0, 0, 100, 90), cv::Rect(601, 401, 119, 159),
         cv::Rect(333, 0, 51, 560), cv::Rect(511, 257, 1, 1), cv::Rect(-9, 200, 50, 33),
         cv::Rect(0, 0, 720, 560), cv::Rect(700, 100, 500, 100)}) {
     for (const auto& [first, end] : {std::pair(0, 99), std::pair(0, 1), std::pair(1, 3), std::pair(2, 99)}) {
-      std::vector<SiftFeature> expected;
+      PooledVector<SiftFeature> expected;
       std::copy_if(whole.begin(), whole.end(), std::back_inserter(expected), [&](const SiftFeature& f) {
         return IsIn(f, region) && f.octave >= first && f.octave < end;
       });
@@ -186,7 +188,7 @@ TEST_P(FindSiftInPart, FeaturesOfARegionAreThoseOfTheWholeImageThere) {
 // Those whose support is the largest, with nothing computed that they do not need.
 TEST_P(FindSiftInPart, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
   const cv::Mat grey = RandomBlobs({900, 700}, 3000, 13);
-  std::vector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
+  PooledVector<SiftFeature> whole = Find(grey, {.doubled = doubled_});
   const auto octave_size = [](const SiftFeature& f) { return std::ldexp(f.size, -f.octave); };
   std::stable_sort(whole.begin(), whole.end(), [&](const auto& a, const auto& b) {
     return std::tuple(a.octave, octave_size(b)) < std::tuple(b.octave, octave_size(a));
@@ -197,7 +199,7 @@ TEST_P(FindSiftInPart, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
       if (f.octave != octave || num_tried >= 20) continue;
       ++num_tried;
       const cv::Rect pixel(static_cast<int>(f.x), static_cast<int>(f.y), 1, 1);
-      const std::vector<SiftFeature> found = Find(
+      const PooledVector<SiftFeature> found = Find(
           grey, {.doubled = doubled_, .first_octave = octave, .end_octave = octave + 1, .region = pixel});
       EXPECT_TRUE(std::find(found.begin(), found.end(), f) != found.end()) << f.x << " " << f.y;
     }
@@ -208,11 +210,11 @@ TEST_P(FindSiftInPart, FeaturesOfOnePixelAreThoseOfTheWholeImageThere) {
 TEST(FindSift, KeepsTheStrongestOfAllAndOfARegion) {
   const cv::Mat grey = RandomBlobs({400, 300}, 500, 9);
   for (const cv::Rect region : {cv::Rect(), cv::Rect(100, 80, 200, 150)}) {
-    std::vector<SiftFeature> all = Find(grey, {.region = region});
+    PooledVector<SiftFeature> all = Find(grey, {.region = region});
     for (const size_t num : {size_t{1}, size_t{17}, all.size() / 2, all.size() - 1, all.size() + 5}) {
-      const std::vector<SiftFeature> found =
+      const PooledVector<SiftFeature> found =
           Find(grey, {.max_num_features = static_cast<int>(num), .region = region});
-      std::vector<SiftFeature> expected = all;
+      PooledVector<SiftFeature> expected = all;
       std::stable_sort(expected.begin(), expected.end(),
                        [](const auto& a, const auto& b) { return a.response > b.response; });
       expected.resize(std::min(num, all.size()));
@@ -228,7 +230,7 @@ TEST(FindSift, MaskedFeaturesAreDroppedBeforeTheStrongestAreKept) {
   const cv::Mat grey = RandomBlobs({300, 200}, 300, 10);
   cv::Mat mask(grey.size(), CV_8UC1, cv::Scalar(0));
   mask(cv::Rect(150, 0, 150, 200)).setTo(1);
-  const std::vector<SiftFeature> all = Find(grey), right = FindSift(grey, mask, {});
+  const PooledVector<SiftFeature> all = Find(grey), right = FindSift(grey, mask, {});
   const auto num_right = std::count_if(all.begin(), all.end(), [](const auto& f) { return f.x >= 149.5f; });
   EXPECT_EQ(static_cast<int64_t>(right.size()), num_right);
   EXPECT_TRUE(std::all_of(right.begin(), right.end(), [](const auto& f) { return f.x >= 149.5f; }));
@@ -238,7 +240,7 @@ TEST(FindSift, MaskedFeaturesAreDroppedBeforeTheStrongestAreKept) {
 TEST_P(FindSiftInPart, OfAllFeaturesThoseWantedAreTheSameBits) {
   const cv::Mat grey = RandomBlobs({400, 300}, 500, 9);
   const auto is_wanted = [](float x, float y, float size) { return x > 2 * y && size < 5; };
-  std::vector<SiftFeature> expected = Find(grey, {.doubled = doubled_});
+  PooledVector<SiftFeature> expected = Find(grey, {.doubled = doubled_});
   const size_t num_all = expected.size();
   std::erase_if(expected, [&](const SiftFeature& f) { return !is_wanted(f.x, f.y, f.size); });
   EXPECT_EQ(Find(grey, {.doubled = doubled_, .is_wanted = is_wanted}), expected);
@@ -260,7 +262,7 @@ Likeness LikenessWithoutDoubling(const cv::Mat& grey, int first, int end) {
   const SiftSearch search{.first_octave = first, .end_octave = end};
   SiftSearch plain = search;
   plain.doubled = false;
-  const std::vector<SiftFeature> doubled = Find(grey, search), own = Find(grey, plain);
+  const PooledVector<SiftFeature> doubled = Find(grey, search), own = Find(grey, plain);
   Likeness likeness;
   int num_found = 0;
   for (const SiftFeature& f : doubled) {
@@ -300,7 +302,7 @@ TEST(FindSift, WithoutDoublingImagesOfHostileSizesAreSearched) {
   for (const cv::Size size : {cv::Size(6, 6), cv::Size(11, 13), cv::Size(2000, 7), cv::Size(7, 2000),
                               cv::Size(31, 33), cv::Size(65, 17), cv::Size(300, 12)}) {
     const cv::Mat grey = Noise(size, 5);
-    const std::vector<SiftFeature> features = Find(grey, {.doubled = false});
+    const PooledVector<SiftFeature> features = Find(grey, {.doubled = false});
     for (const SiftFeature& f : features) {
       EXPECT_TRUE(std::isfinite(f.size + f.response));
       EXPECT_TRUE(IsIn(f, cv::Rect({0, 0}, size))) << size;
@@ -317,7 +319,7 @@ TEST(FindSift, ShiftedImageHasShiftedFeatures) {
   const SiftSearch search{.end_octave = 3, .region = cv::Rect(180, 180, 200, 120)};
   SiftSearch there = search;
   there.region -= cv::Point(2, 2);
-  const std::vector<SiftFeature> here = Find(grey, search), found = Find(shifted, there);
+  const PooledVector<SiftFeature> here = Find(grey, search), found = Find(shifted, there);
   ASSERT_EQ(found.size(), here.size());
   ASSERT_GT(here.size(), 150u);
   for (size_t i = 0; i < here.size(); ++i) {
@@ -334,8 +336,8 @@ TEST(FindSift, RotatedImageHasRotatedFeatures) {
   const cv::Mat grey = RandomBlobs({300, 240}, 500, 12);
   cv::Mat rotated;
   cv::rotate(grey, rotated, cv::ROTATE_90_CLOCKWISE);
-  const std::vector<SiftFeature> here = Find(grey, {.end_octave = 1}),
-                                 found = Find(rotated, {.end_octave = 1});
+  const PooledVector<SiftFeature> here = Find(grey, {.end_octave = 1}),
+                                  found = Find(rotated, {.end_octave = 1});
   ASSERT_GT(here.size(), 150u);
   int num_found = 0;
   double distance = 0;

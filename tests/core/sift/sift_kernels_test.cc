@@ -1,5 +1,6 @@
 // Without OpenCV, so that it is compiled for other processors too (test_on_aarch64.sh).
 #include "core/sift/sift_kernels.h"
+#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
@@ -135,9 +136,9 @@ TEST(SiftKernels, EveryInstructionSetGivesTheSameBits) {
 }
 
 // Brute force [Lowe04 §3.1].
-std::vector<SiftCandidate> ExtremaOf(const std::vector<std::vector<float>>& levels, int begin, int end,
-                                     int first_row, int num_rows, float threshold) {
-  std::vector<SiftCandidate> candidates;
+PooledVector<SiftCandidate> ExtremaOf(const std::vector<std::vector<float>>& levels, int begin, int end,
+                                      int first_row, int num_rows, float threshold) {
+  PooledVector<SiftCandidate> candidates;
   const auto difference = [&](int layer, int x, int y) {
     return levels[layer + 1][y * kStride + x] - levels[layer][y * kStride + x];
   };
@@ -174,10 +175,10 @@ TEST(SiftKernels, ExtremaAreThoseOfBruteForce) {
         for (int l = 0; l < kSiftLevels; ++l) {
           for (int r = 0; r < 9; ++r) rows.levels[l][r] = levels[l].data() + (29 + r) * kStride;
         }
-        std::vector<SiftCandidate> found(7 * kCols);
+        PooledVector<SiftCandidate> found(7 * kCols);
         found.resize(kernels->find_extrema(rows, found.data()));
         std::sort(found.begin(), found.end(), by_place);
-        const std::vector<SiftCandidate> expected = ExtremaOf(levels, begin, end, 30, 7, threshold);
+        const PooledVector<SiftCandidate> expected = ExtremaOf(levels, begin, end, 30, 7, threshold);
         EXPECT_EQ(found, expected) << kernels->name << " " << begin << " " << threshold;
         EXPECT_TRUE(end - begin < 100 || expected.size() > 10);
       }

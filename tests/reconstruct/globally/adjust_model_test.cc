@@ -1,4 +1,5 @@
 #include "stages/reconstruct/globally/adjust_model.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 #include <map>
@@ -82,7 +83,7 @@ TEST(AdjustModel, OfALevelCameraPixelsStaySquare) {
   problem.cameras = {{.camera = off, .stated = stated, .free = {0, 1}, .sigma = {15, 15}}};
   // A camera changes by so much at a time.
   for (int k = 0; k < 3; ++k) AdjustModel({.max_num_iterations = 50, .function_tolerance = 1e-10}, &problem);
-  const std::vector<double>& found = problem.cameras[0].camera.params;
+  const PooledVector<double>& found = problem.cameras[0].camera.params;
   EXPECT_NEAR(found[0] / found[1], 1, 2e-3);
 }
 

@@ -1,4 +1,5 @@
 #include "stages/reconstruct/registration/standing_images.h"
+#include "core/base/pooled.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@ MapperInput MovedImages(const std::vector<float>& shifts_px) {
   input.cameras.emplace(1, GuessCamera(1, 640, 480));
   for (size_t i = 0; i < shifts_px.size(); ++i) {
     input.images.push_back({static_cast<ImageId>(10 + i), "", 1});
-    std::vector<Keypoint> keypoints;
+    PooledVector<Keypoint> keypoints;
     for (int k = 0; k < 20; ++k)
       keypoints.push_back({.x = static_cast<float>(20 * k) + shifts_px[i], .y = 50, .scale = 1});
     input.keypoints.push_back(keypoints);

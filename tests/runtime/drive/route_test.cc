@@ -1,4 +1,5 @@
 #include "runtime/drive/route.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 
@@ -181,7 +182,7 @@ TEST(Retrieve, SparseMapsLeadToKeptImagesAlone) {
   const auto images = [&](const MapRows& of) {
     std::vector<int32_t> found;
     const auto map = *Map::FromRows(of);
-    const Result<std::vector<Candidate>> candidates = RetrieveByWords(*map, query, {});
+    const Result<PooledVector<Candidate>> candidates = RetrieveByWords(*map, query, {});
     for (const Candidate& candidate : *candidates) found.push_back(candidate.image);
     std::sort(found.begin(), found.end());
     return found;

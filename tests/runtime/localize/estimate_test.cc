@@ -1,4 +1,5 @@
 #include "runtime/localize/estimate.h"
+#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <iterator>
@@ -13,9 +14,9 @@ namespace {
 const Pose kTruth{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.3, -1, 0.5).normalized())),
                   {100, -20, 3}};
 
-std::vector<PoseMeasurement> MakeScene(int num_inliers, int num_outliers, uint64_t seed) {
+PooledVector<PoseMeasurement> MakeScene(int num_inliers, int num_outliers, uint64_t seed) {
   Random random(seed);
-  std::vector<PoseMeasurement> measurements;
+  PooledVector<PoseMeasurement> measurements;
   for (int i = 0; i < num_inliers + num_outliers; ++i) {
     const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
     PoseMeasurement measurement;
@@ -85,7 +86,7 @@ TEST(EstimatePoses, BestFirstAndEachOfOtherMatches) {
   const auto many = EstimatePoses(measurements, 8, {}, {}, 0);
   for (size_t a = 0; a < many.size(); ++a) {
     for (size_t b = 0; b < a; ++b) {
-      std::vector<int> both;
+      PooledVector<int> both;
       std::set_intersection(many[a].inliers.begin(), many[a].inliers.end(), many[b].inliers.begin(),
                             many[b].inliers.end(), std::back_inserter(both));
       EXPECT_LE(10 * both.size(), 9 * std::min(many[a].inliers.size(), many[b].inliers.size()));
@@ -104,7 +105,7 @@ TEST(EstimateOtherPose, IsOfWhatTheFirstLeavesOver) {
   const auto found = EstimateOtherPose(measurements, first, {}, {}, 0);
   ASSERT_TRUE(found);
   EXPECT_LT(CenterErrorM(found->cam_from_world, other * kTruth), 0.05);
-  std::vector<int> even;
+  PooledVector<int> even;
   for (int i = 0; i < 30; i += 2) even.push_back(i);
   EXPECT_EQ(found->inliers, even);
   // Nothing where three are left.

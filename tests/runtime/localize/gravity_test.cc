@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "runtime/localize/estimate.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -30,9 +31,9 @@ Pose Tilted(const Pose& pose, double pitch_deg, double roll_deg) {
 }
 
 // Points ahead of a camera, of which so many are seen where they are.
-std::vector<PoseMeasurement> MakeScene(const Pose& truth, int num_inliers, int num_outliers, double sigma_px,
-                                       Random& random) {
-  std::vector<PoseMeasurement> measurements;
+PooledVector<PoseMeasurement> MakeScene(const Pose& truth, int num_inliers, int num_outliers, double sigma_px,
+                                        Random& random) {
+  PooledVector<PoseMeasurement> measurements;
   for (int i = 0; i < num_inliers + num_outliers; ++i) {
     const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
     PoseMeasurement measurement;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
@@ -87,12 +88,12 @@ TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
 
 // A first pose that enough matches led to.
 PoseEstimate FromMany(const Pose& cam_from_world) {
-  return {cam_from_world, std::vector<int>(MatchOptions().guided_sure_num_inliers)};
+  return {cam_from_world, PooledVector<int>(MatchOptions().guided_sure_num_inliers)};
 }
 
 // One that few led to.
 PoseEstimate FromFew(const Pose& cam_from_world) {
-  return {cam_from_world, std::vector<int>(MatchOptions().guided_sure_num_inliers - 1)};
+  return {cam_from_world, PooledVector<int>(MatchOptions().guided_sure_num_inliers - 1)};
 }
 
 TEST(MatchGuidedInRounds, WhatIsFoundRefinesThePoseAndLeadsToTheRest) {

@@ -1,4 +1,5 @@
 #include "runtime/localize/localizer.h"
+#include "core/base/pooled.h"
 
 #include <thread>
 
@@ -193,7 +194,7 @@ TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {
   query.camera.width = 640;
   query.camera.height = 480;
   Random random(4);
-  std::vector<PoseMeasurement> measurements(100);
+  PooledVector<PoseMeasurement> measurements(100);
   for (PoseMeasurement& measurement : measurements) {
     measurement.point = Eigen::Vector3d(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), 3);
     measurement.ray.ray = measurement.point.hnormalized();

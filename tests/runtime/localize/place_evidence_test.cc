@@ -1,4 +1,5 @@
 #include "runtime/localize/place_evidence.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 
@@ -34,7 +35,7 @@ class EvidenceOfPlaceTest : public testing::Test {
 
   PlaceEvidence Evidence(const std::vector<LandmarkIdx>& found, int num_cells = 10) {
     const auto map = *Map::FromRows(rows_);
-    std::vector<Correspondence> matches;
+    PooledVector<Correspondence> matches;
     for (const LandmarkIdx landmark : found)
       matches.push_back({static_cast<KeypointIdx>(matches.size()), landmark});
     return *EvidenceOfPlace(*map, query_, PoseAt({0, 0, 0}, 90), **map->AllLandmarks(), matches, 17,

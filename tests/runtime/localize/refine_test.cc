@@ -1,4 +1,5 @@
 #include "runtime/localize/refine.h"
+#include "core/base/pooled.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
@@ -12,9 +13,9 @@ namespace {
 const RefineOptions kIndependent{.covariance_scale = 1};
 
 // Points in front of a camera with focal length 500 px, seen with noise of sigma_px and, in part, wrongly.
-std::vector<PoseMeasurement> MakeScene(const Pose& truth, int num_points, double sigma_px,
-                                       double outlier_ratio, Random& random) {
-  std::vector<PoseMeasurement> measurements;
+PooledVector<PoseMeasurement> MakeScene(const Pose& truth, int num_points, double sigma_px,
+                                        double outlier_ratio, Random& random) {
+  PooledVector<PoseMeasurement> measurements;
   while (static_cast<int>(measurements.size()) < num_points) {
     const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
     PoseMeasurement measurement;

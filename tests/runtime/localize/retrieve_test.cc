@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -42,24 +43,25 @@ std::shared_ptr<const Map> SmallMap() {
 
 TEST(Retrieve, RegionsAreOrderedByTheVotesOfTheirCandidates) {
   const auto map = SmallMap();
-  EXPECT_THAT(*RegionsOfCandidates(*map, {{0, 0.5}, {2, 0.4}}, {}), ElementsAre(0, 1));
-  EXPECT_THAT(*RegionsOfCandidates(*map, {{2, 0.5}, {0, 0.4}}, {}), ElementsAre(1, 0));
-  EXPECT_THAT(*RegionsOfCandidates(*map, {{1, 0.5}}, {}), ElementsAre(0, 1));  // tie: the smaller index
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{0, 0.5}, {2, 0.4}}, {}), ElementsAre(0, 1));
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{2, 0.5}, {0, 0.4}}, {}), ElementsAre(1, 0));
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{1, 0.5}}, {}),
+              ElementsAre(0, 1));  // tie: the smaller index
   RetrieveOptions one;
   one.max_num_regions = 1;
-  EXPECT_THAT(*RegionsOfCandidates(*map, {{2, 0.5}, {0, 0.4}}, one), ElementsAre(1));
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{2, 0.5}, {0, 0.4}}, one), ElementsAre(1));
 }
 
 TEST(Retrieve, LandmarksOfRegionsAndImagesAreUnions) {
   const auto map = SmallMap();
-  EXPECT_THAT(*LandmarksOfRegions(*map, {1, 0}), ElementsAre(0, 1, 2));
-  EXPECT_THAT(*LandmarksOfImages(*map, {0, 2}), ElementsAre(0, 1, 2));
-  EXPECT_THAT(*LandmarksOfImages(*map, {2}), ElementsAre(2));
+  EXPECT_THAT(*LandmarksOfRegions(*map, std::vector{1, 0}), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*LandmarksOfImages(*map, std::vector{0, 2}), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*LandmarksOfImages(*map, std::vector{2}), ElementsAre(2));
 }
 
 TEST(Retrieve, NearestViewsAreNearByPlaceAndAngle) {
   const auto map = SmallMap();
-  const auto images = [](const std::vector<NearView>& views) {
+  const auto images = [](std::span<const NearView> views) {
     std::vector<int32_t> indices;
     for (const NearView& view : views) indices.push_back(view.image);
     return indices;
@@ -115,19 +117,19 @@ TEST(Retrieve, CovisibleLandmarksComeFromTheImagesThatShareMost) {
   const auto map = SmallMap();
   MatchOptions one;
   one.guided_num_images = 1;
-  EXPECT_THAT(*CovisibleLandmarks(*map, {0, 1}, one),
+  EXPECT_THAT(*CovisibleLandmarks(*map, std::vector{0, 1}, one),
               ElementsAre(0, 1));  // images 0 and 1 tie: the smaller index
-  EXPECT_THAT(*CovisibleLandmarks(*map, {0, 1, 2}, one), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*CovisibleLandmarks(*map, std::vector{0, 1, 2}, one), ElementsAre(0, 1, 2));
   MatchOptions two;
   two.guided_num_images = 2;
-  EXPECT_THAT(*CovisibleLandmarks(*map, {0}, two), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*CovisibleLandmarks(*map, std::vector{0}, two), ElementsAre(0, 1, 2));
 }
 
 TEST(Retrieve, RegionWithMostOfTheLandmarksIsFound) {
   const auto map = SmallMap();
-  EXPECT_EQ(*RegionWithMost(*map, {0, 1, 2}), 0);
-  EXPECT_EQ(*RegionWithMost(*map, {1, 2}), 0);  // tie: the smaller index
-  EXPECT_EQ(*RegionWithMost(*map, {2}), 1);
+  EXPECT_EQ(*RegionWithMost(*map, std::vector{0, 1, 2}), 0);
+  EXPECT_EQ(*RegionWithMost(*map, std::vector{1, 2}), 0);  // tie: the smaller index
+  EXPECT_EQ(*RegionWithMost(*map, std::vector{2}), 1);
   EXPECT_EQ(*RegionWithMost(*map, {}), -1);
 }
 

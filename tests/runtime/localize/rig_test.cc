@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "runtime/localize/estimate.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -42,7 +43,7 @@ TEST(Rig, PosesOfPointsThatNoCameraSeesThreeOf) {
   Random random(1);
   const std::vector<Pose> cams_from_rig = Mast(8);
   const Pose truth = PoseAt({3, -2, 1}, 50);
-  std::vector<PoseMeasurement> measurements;
+  PooledVector<PoseMeasurement> measurements;
   for (int i = 0; i < 8; ++i) {
     for (int k = 0; k < 8; ++k) {
       const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 6));

@@ -37,7 +37,7 @@ std::shared_ptr<const Map> FourRegions() {
   camera.params = {100, 50, 50};
   rows.cameras = {camera};
   rows.landmarks.resize(56);
-  rows.descriptors.setZero(56, kSiftDescriptorDim);
+  rows.descriptors = DescriptorMatrix::Zero(56, kSiftDescriptorDim);
   const std::vector<std::vector<LandmarkIdx>> in_view = {Range(0, 4), Range(4, 10), Range(14, 10),
                                                          Range(24, 30)};
   for (const std::vector<LandmarkIdx>& landmarks : in_view) {

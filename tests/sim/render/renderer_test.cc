@@ -1,4 +1,5 @@
 #include "sim/render/renderer.h"
+#include "core/base/pooled.h"
 
 #include <cmath>
 
@@ -153,7 +154,7 @@ TEST(Renderer, GivesFeaturesThatMatchWhereTheGeometrySays) {
     EXPECT_GT(features[i].keypoints.size(), 500u);
   }
   int num_right = 0;
-  const std::vector<Match> matches =
+  const PooledVector<Match> matches =
       MatchDescriptors(features[0].descriptors, features[1].descriptors, {}, DescriptorMatcherOptions());
   for (const Match& match : matches) {
     const Keypoint &a = features[0].keypoints[match.idx1], &b = features[1].keypoints[match.idx2];
