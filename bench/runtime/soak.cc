@@ -56,7 +56,8 @@ Status Run(const std::string& map_path, const std::string& capture_path, int64_t
   options.budget_ms = budget_ms;
   RegionTracker tracker(map, options);
   fmt::print(
-      "| frames | fixes | wrong, with P > 0.99 | MiB held | requests for memory a frame | work, most, ms |\n"
+      "| frames | fixes | wrong, with P > 0.99 | MiB held | requests for memory since the row before | work, "
+      "most, ms |\n"
       "|--:|--:|--:|--:|--:|--:|\n");
   FixFigures figures;
   int num_sure_wrong = 0;
@@ -85,9 +86,9 @@ Status Run(const std::string& map_path, const std::string& capture_path, int64_t
     figures.errors_deg.clear();
     figures.errors_squared.clear();
     if ((i + 1) % std::max<int64_t>(1, num_frames / num_rows) == 0) {
-      fmt::print("| {} | {} | {}, {} | {:.1f} | {:.1f} | {:.1f} |\n", i + 1, figures.num_fixes,
-                 figures.num_wrong, num_sure_wrong, ResidentMib(),
-                 static_cast<double>(num_requests_in_frames) / static_cast<double>(i + 1), most_work_ms);
+      fmt::print("| {} | {} | {}, {} | {:.1f} | {} | {:.1f} |\n", i + 1, figures.num_fixes, figures.num_wrong,
+                 num_sure_wrong, ResidentMib(), num_requests_in_frames, most_work_ms);
+      num_requests_in_frames = 0;
       std::fflush(stdout);
     }
   }
