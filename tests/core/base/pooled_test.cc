@@ -1,10 +1,13 @@
 #include "core/base/pooled.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -18,6 +21,16 @@ constexpr bool kKeeps = true;
 #endif
 
 constexpr size_t kMib = size_t{1} << 20;
+
+// An object of a thread that was made before its pool, and outlives it.
+struct Late {
+  PooledVector<int> values;
+  ~Late() {
+    values.assign(10000, 1);
+    values = {};
+    GivePooled(TakePooled(10000));
+  }
+};
 
 // In a thread of its own, which keeps nothing yet.
 template <typename Test>
@@ -112,6 +125,51 @@ TEST(Pooled, NoMoreThan16MibAreKept) {
   });
 }
 
+TEST(Pooled, WhatIsTakenAgainIsNoLongerCounted) {
+  if (!kKeeps) GTEST_SKIP();
+  InNewThread([] {
+    void* const first = TakePooled(kMib);
+    GivePooled(first);
+    for (int i = 0; i < 40; ++i) {
+      ASSERT_EQ(TakePooled(kMib), first) << i;
+      GivePooled(first);
+    }
+  });
+}
+
+TEST(Pooled, TheLargestAreNotKept) {
+  if (!kKeeps) GTEST_SKIP();
+  InNewThread([] {
+    GivePooled(TakePooled(8 * kMib + 1));
+    GivePooled(TakePooled(100 * kMib));
+    void* const small = TakePooled(1000);
+    GivePooled(small);
+    EXPECT_EQ(TakePooled(1000), small);
+    GivePooled(small);
+  });
+}
+
+TEST(Pooled, AThreadThatEndsGivesAllBack) {
+  if (!kKeeps) GTEST_SKIP();
+  const auto num_in_use = [] {
+    const struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  const auto work = [] {
+    thread_local Late late;
+    late.values.assign(100, 3);
+    EXPECT_EQ(late.values[99], 3);
+    std::vector<void*> taken;
+    for (size_t i = 0; i < 64; ++i) taken.push_back(TakePooled(i * 10000));
+    for (int i = 0; i < 24; ++i) taken.push_back(TakePooled(kMib));
+    for (void* block : taken) GivePooled(block);
+  };
+  InNewThread(work);  // what the C library keeps of a first thread
+  const size_t before = num_in_use();
+  for (int i = 0; i < 3; ++i) InNewThread(work);
+  EXPECT_LT(num_in_use(), before + 4096);
+}
+
 TEST(Pooled, AnotherThreadMayGiveItBack) {
   void* memory = nullptr;
   InNewThread([&] { memory = TakePooled(1000); });
@@ -124,23 +182,6 @@ TEST(Pooled, AnotherThreadMayGiveItBack) {
   } else {
     GivePooled(memory);
   }
-}
-
-// Objects of a thread that were made before its pool outlive it.
-TEST(Pooled, WorksWhileAThreadEnds) {
-  struct Late {
-    PooledVector<int> values;
-    ~Late() {
-      values.assign(10000, 1);
-      values = {};
-      GivePooled(TakePooled(100));
-    }
-  };
-  InNewThread([] {
-    thread_local Late late;
-    late.values.assign(100, 3);
-    EXPECT_EQ(late.values[99], 3);
-  });
 }
 
 TEST(Pooled, VectorsGrow) {
