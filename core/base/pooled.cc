@@ -38,8 +38,17 @@ size_t BytesOf(int size) {
   return whole + whole / kSteps * (size % kSteps);
 }
 
-// Sanitizers see what is used after it was given back only where it goes back to them.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+size_t WholeBytesOf(int size) { return sizeof(Block) + BytesOf(size); }
+
+// Sanitizers see what is used after it was given back only where it goes back to them.  (g++ tells by macros,
+// clang by a question.)
+#if defined(__has_feature)
+#define CAIRN_HAS_FEATURE(feature) __has_feature(feature)
+#else
+#define CAIRN_HAS_FEATURE(feature) 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || CAIRN_HAS_FEATURE(address_sanitizer) || \
+    CAIRN_HAS_FEATURE(thread_sanitizer)
 constexpr bool kKeeps = false;
 #else
 constexpr bool kKeeps = true;
@@ -60,15 +69,22 @@ class Pool {
       Block* const block = blocks_[at];
       if (block == nullptr) continue;
       blocks_[at] = block->next;
-      num_bytes_ -= BytesOf(at);
+      num_bytes_ -= WholeBytesOf(at);
       return block;
     }
     return nullptr;
   }
 
-  // False: enough is kept.
+  // False: enough is kept.  Larger blocks make room for it: a large search must not keep what repeats from
+  // being kept.
   bool Keep(Block* block) {
-    const size_t num_bytes = BytesOf(block->size);
+    const size_t num_bytes = WholeBytesOf(block->size);
+    for (int at = kNumSizes - 1; at > block->size && num_bytes_ + num_bytes > kMaxKeptBytes; --at) {
+      while (blocks_[at] != nullptr && num_bytes_ + num_bytes > kMaxKeptBytes) {
+        num_bytes_ -= WholeBytesOf(at);
+        operator delete(std::exchange(blocks_[at], blocks_[at]->next), kAlignment);
+      }
+    }
     if (num_bytes_ + num_bytes > kMaxKeptBytes) return false;
     num_bytes_ += num_bytes;
     block->next = blocks_[block->size];

@@ -13,5 +13,3 @@ ContentHash HashFeatures(const PooledVector<Keypoint>& keypoints, const Descript
 }
 
 }  // namespace cairn
-
-#include "core/base/pooled.h"

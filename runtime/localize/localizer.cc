@@ -602,7 +602,8 @@ void QueryFrame::set_up(const SensedUp& up) {
   up_ = up;
   if (!query_) return;
   Query with_up = *query_;
-  if (localizer_.SetUp(up, &with_up).ok()) query_ = std::make_shared<const Query>(std::move(with_up));
+  if (localizer_.SetUp(up, &with_up).ok())
+    query_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(with_up));
 }
 
 Result<const Query*> QueryFrame::WithAllFeaturesForLog() {
@@ -611,7 +612,7 @@ Result<const Query*> QueryFrame::WithAllFeaturesForLog() {
     const auto any_work = std::make_shared<WorkBudget>();
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, any_work)
                                               : localizer_.QueryFromFeatures(features_, camera_, any_work));
-    for_log_ = std::make_shared<const Query>(std::move(query));
+    for_log_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(query));
   }
   return for_log_.get();
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <set>
 #include <thread>
 #include <vector>
@@ -120,8 +121,8 @@ TEST(Pooled, NoMoreThan16MibAreKept) {
     for (void* block : taken) GivePooled(block);
     GivePooled(huge);  // there is no room for it any more
     // The last that was kept comes first.
-    for (int i = 16; i-- > 0;) EXPECT_EQ(TakePooled(kMib), taken[i]) << i;
-    for (int i = 0; i < 16; ++i) GivePooled(taken[i]);
+    for (int i = 15; i-- > 0;) EXPECT_EQ(TakePooled(kMib), taken[i]) << i;  // and 64 bytes each
+    for (int i = 0; i < 15; ++i) GivePooled(taken[i]);
   });
 }
 
@@ -134,6 +135,23 @@ TEST(Pooled, WhatIsTakenAgainIsNoLongerCounted) {
       ASSERT_EQ(TakePooled(kMib), first) << i;
       GivePooled(first);
     }
+  });
+}
+
+TEST(Pooled, LargerBlocksMakeRoomForSmallOnes) {
+  if (!kKeeps) GTEST_SKIP();
+  InNewThread([] {
+    std::vector<void*> taken;
+    for (int i = 0; i < 16; ++i) taken.push_back(TakePooled(kMib));
+    for (void* block : taken) GivePooled(block);  // now it is full
+    std::vector<void*> small;
+    for (int i = 0; i < 3000; ++i) small.push_back(TakePooled(1000));
+    for (void* block : small) GivePooled(block);
+    // Nobody else may get them meanwhile.
+    std::vector<std::unique_ptr<char[]>> others;
+    for (int i = 0; i < 3000; ++i) others.push_back(std::make_unique<char[]>(1000));
+    for (int i = 3000; i-- > 0;) ASSERT_EQ(TakePooled(1000), small[i]) << i;
+    for (void* block : small) GivePooled(block);
   });
 }
 

@@ -13,6 +13,7 @@ inline std::atomic<long> num_requests{0};
 
 }  // namespace cairn
 
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which have allocators of their own
 // glibc's own, counted.
 extern "C" {
 void* __libc_malloc(size_t num_bytes);
@@ -46,3 +47,4 @@ void* memalign(size_t alignment, size_t num_bytes) {
   return __libc_memalign(alignment, num_bytes);
 }
 }
+#endif

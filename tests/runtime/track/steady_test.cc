@@ -1,14 +1,12 @@
 // A camera that is followed asks the system for no memory, frame by frame.
 #include <functional>
+#include <memory>
 #include <thread>
+#include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/base/pooled.h"
 #include "core/features/sift.h"
-#include "runtime/c_api/cairn.h"
-#include "runtime/drive/sure_tracker.h"
 #include "runtime/track/region_tracker.h"
 #include "tests/runtime/localize/poster_scene.h"
 #include "tests/runtime/track/count_requests.h"
