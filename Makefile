@@ -38,7 +38,7 @@ PACKAGES_SYSROOT := libc6-dev $(LIBRARIES) $(PACKAGES_PYTHON) $(LIBRARIES_TEST)
 SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all help program whole deps deps-all demo tables test bench reproduce maps compile install deb sysroot sysroot-packages format format-check tidy docs clean
+.PHONY: all help program whole deps deps-all demo tables test test-arm64 bench reproduce maps compile install deb sysroot sysroot-packages format format-check tidy docs clean
 # Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
@@ -78,6 +78,9 @@ tables: program  ## Localize held-out images and images of other places in three
 
 test: whole  ## Build all and run all tests
 	@ctest --preset $(PRESET) --parallel $(shell nproc)
+
+test-arm64: whole  ## Build for 64-bit ARM, packages too, and run tests in an emulator (half an hour)
+	@ctest --test-dir build/$(PRESET) --build-config Arm64 --tests-regex 'Arm64' --output-on-failure
 
 bench: whole  ## Build and run the benchmarks
 	@cmake --preset $(PRESET) -DCAIRN_BUILD_BENCHMARKS=ON

@@ -18,7 +18,7 @@ import sys
 # Pages in the order of the table; folders are those of bench/.
 ORDER = """
 held_out redkitchen poses reconstruct change ../docs/sizes.md
-sift features pairs matching regions vocabulary appearance views visual_map
+sift features pairs matching arm64 regions vocabulary appearance views visual_map
 drive atlas servo
 runtime bindings report
 scale crash
