@@ -21,10 +21,10 @@ const cv::Size kSize(640, 480);
 
 DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
   Random random(seed);
-  DescriptorMatrix descriptors(num, kDescriptorDim);
+  DescriptorMatrix descriptors(num, kSiftDescriptorDim);
   for (int i = 0; i < num; ++i) {
     // The mean square of 0 to 78 is 2^18 / 128: RootSIFT's norm.
-    for (int d = 0; d < kDescriptorDim; ++d)
+    for (int d = 0; d < kSiftDescriptorDim; ++d)
       descriptors(i, d) = static_cast<uint8_t>(random.UniformInt(0, 78));
   }
   return descriptors;
@@ -51,8 +51,8 @@ int FindFeatures(const std::string& kernel, const std::string& path, int times) 
 int Match(const std::string& name, int num, int times) {
   for (const MatchKernel kernel : kMatchKernels) {
     if (NameOf(kernel) != name || !IsKernelSupported(kernel)) continue;
-    const PackedDescriptors descriptors1(RandomDescriptors(num, 1), kernel);
-    const PackedDescriptors descriptors2(RandomDescriptors(num, 2), kernel);
+    const PackedDescriptors descriptors1(RandomDescriptors(num, 1), {}, kernel);
+    const PackedDescriptors descriptors2(RandomDescriptors(num, 2), {}, kernel);
     size_t num_matches = 0;
     for (int i = 0; i < times; ++i)
       num_matches = MatchDescriptors(descriptors1, descriptors2, {.max_ratio = 1}).size();
