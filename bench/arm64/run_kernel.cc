@@ -9,7 +9,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/base/random.h"
+#include "bench/matching/random_descriptors.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/features/sift.h"
 #include "core/sift/find_sift.h"
@@ -18,17 +18,6 @@ namespace cairn {
 namespace {
 
 const cv::Size kSize(640, 480);
-
-DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
-  Random random(seed);
-  DescriptorMatrix descriptors(num, kSiftDescriptorDim);
-  for (int i = 0; i < num; ++i) {
-    // The mean square of 0 to 78 is 2^18 / 128: RootSIFT's norm.
-    for (int d = 0; d < kSiftDescriptorDim; ++d)
-      descriptors(i, d) = static_cast<uint8_t>(random.UniformInt(0, 78));
-  }
-  return descriptors;
-}
 
 int FindFeatures(const std::string& kernel, const std::string& path, int times) {
   cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE);

@@ -4,6 +4,9 @@
 //   relight IMAGES OUTPUT RATIO      RATIO: brightest over darkest, 1 or more
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <string>

@@ -3,23 +3,12 @@
 // included.  No data needed; compare_matchers.sh holds the kernels against their peers.
 #include <benchmark/benchmark.h>
 
+#include "bench/matching/random_descriptors.h"
 #include "core/base/pooled.h"
-#include "core/base/random.h"
 #include "core/features/descriptor_matcher.h"
 
 namespace cairn {
 namespace {
-
-DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
-  Random random(seed);
-  DescriptorMatrix descriptors(num, kSiftDescriptorDim);
-  for (int i = 0; i < num; ++i) {
-    // The mean square of 0 to 78 is 2^18 / 128.
-    for (int d = 0; d < kSiftDescriptorDim; ++d)
-      descriptors(i, d) = static_cast<uint8_t>(random.UniformInt(0, 78));
-  }
-  return descriptors;
-}
 
 bool SkipIfUnsupported(MatchKernel kernel, benchmark::State& state) {
   if (!IsKernelSupported(kernel)) state.SkipWithError("this processor lacks the instructions");

@@ -16,9 +16,14 @@ namespace {
 
 constexpr int kNumFrames = 8;
 
-// Back and forth before the poster.
+// Back and forth before the poster: at which of its places a frame is.
+int PlaceOf(int frame) {
+  const int at = frame % kNumFrames;
+  return frame % (2 * kNumFrames) < kNumFrames ? at : kNumFrames - 1 - at;
+}
+
 Pose PoseOfFrame(int i) {
-  const int at = i % (2 * kNumFrames) < kNumFrames ? i % kNumFrames : kNumFrames - 1 - i % kNumFrames;
+  const int at = PlaceOf(i);
   return PoseAt({0.02 * at, 0.03 * at - 0.1, 1.5}, 0.5 * at);
 }
 
@@ -28,8 +33,7 @@ const cv::Mat& ImageOfFrame(int i) {
     for (int k = 0; k < kNumFrames; ++k) rendered.push_back(RenderPoster(Poster(), PoseOfFrame(k)));
     return rendered;
   }();
-  const int at = i % (2 * kNumFrames) < kNumFrames ? i % kNumFrames : kNumFrames - 1 - i % kNumFrames;
-  return images[at];
+  return images[PlaceOf(i)];
 }
 
 // The requests of the third time to and fro: the first two ask for the most that any frame needs.
@@ -93,12 +97,9 @@ TEST_F(Steady, ByGivenFeatures) {
   std::vector<Features> features;
   for (int i = 0; i < kNumFrames; ++i) features.push_back(*ExtractSift(ImageOfFrame(i), {}));
   RegionTracker tracker = MakeTracker();
-  EXPECT_EQ(RequestsOf([&](int i) {
-              const int at =
-                  i % (2 * kNumFrames) < kNumFrames ? i % kNumFrames : kNumFrames - 1 - i % kNumFrames;
-              return HasFix(tracker.TrackFeatures(features[at], Poster().camera));
-            }),
-            0);
+  EXPECT_EQ(
+      RequestsOf([&](int i) { return HasFix(tracker.TrackFeatures(features[PlaceOf(i)], Poster().camera)); }),
+      0);
 }
 
 TEST_F(Steady, WithOdometryGravityAndARollingShutter) {
