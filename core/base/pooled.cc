@@ -40,8 +40,7 @@ size_t BytesOf(int size) {
 
 size_t WholeBytesOf(int size) { return sizeof(Block) + BytesOf(size); }
 
-// Sanitizers see what is used after it was given back only where it goes back to them.  (g++ tells by macros,
-// clang by a question.)
+// Of sanitizers g++ tells by macros, clang by a question.
 #if defined(__has_feature)
 #define CAIRN_HAS_FEATURE(feature) __has_feature(feature)
 #else
@@ -134,6 +133,8 @@ void GivePooled(void* memory) noexcept {
   }
   operator delete(block, kAlignment);
 }
+
+bool KeepsPooled() { return kKeeps; }
 
 size_t PooledSize(size_t num_bytes) {
   return sizeof(Block) + (num_bytes <= kLargestBytes ? BytesOf(SizeFor(num_bytes)) : num_bytes);

@@ -221,7 +221,7 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
 }
 
 int64_t NumBytes(const LandmarkBlock& block) {
-  int64_t num_bytes = static_cast<int64_t>(sizeof(block)) + block.descriptors.size();
+  int64_t num_bytes = static_cast<int64_t>(sizeof(block)) + block.descriptors.num_bytes();
   num_bytes += static_cast<int64_t>(block.landmarks.size() * sizeof(MapLandmark));
   num_bytes += static_cast<int64_t>(block.image_blocks.size() * sizeof(int32_t));
   for (const auto& [region, landmarks] : block.regions) {

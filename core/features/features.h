@@ -43,7 +43,6 @@ class DescriptorMatrix
       : DescriptorMatrix(other.rows(), other.cols()) {
     Map::operator=(other.derived());
   }
-  // REQUIRES: not of a part of itself
   DescriptorMatrix& operator=(const DescriptorMatrix& other) {
     values_ = other.values_;
     Show(other.rows(), other.cols());
@@ -75,6 +74,8 @@ class DescriptorMatrix
   // Rows that there were are kept.  REQUIRES: as many columns, or no rows before
   void conservativeResize(Eigen::Index rows, Eigen::Index cols) { resize(rows, cols); }
   void conservativeResize(Eigen::Index rows, Eigen::NoChange_t /*cols*/) { resize(rows, cols()); }
+
+  int64_t num_bytes() const { return static_cast<int64_t>(PooledSize(values_.capacity())); }
 
   static auto Zero(Eigen::Index rows, Eigen::Index cols) { return Matrix::Zero(rows, cols); }
   static auto Constant(Eigen::Index rows, Eigen::Index cols, uint8_t value) {

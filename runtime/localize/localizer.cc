@@ -160,11 +160,10 @@ Status Localizer::CheckImage(const cv::Mat& grey, const Camera& camera) const {
 }
 
 std::shared_ptr<WorkBudget> Localizer::MakeBudget() const {
-  const PoolAllocator<WorkBudget> pool;
-  if (options_.budget_ms == 0) return std::allocate_shared<WorkBudget>(pool);
+  if (options_.budget_ms == 0) return MakePooled<WorkBudget>();
   const double ms = options_.budget_ms * options_.core_speed;
   constexpr double kNone = -1;
-  return std::allocate_shared<WorkBudget>(pool, ms > 0 ? ms : kNone);
+  return MakePooled<WorkBudget>(ms > 0 ? ms : kNone);
 }
 
 Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera, Budget work) const {
@@ -602,8 +601,7 @@ void QueryFrame::set_up(const SensedUp& up) {
   up_ = up;
   if (!query_) return;
   Query with_up = *query_;
-  if (localizer_.SetUp(up, &with_up).ok())
-    query_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(with_up));
+  if (localizer_.SetUp(up, &with_up).ok()) query_ = MakePooled<Query>(std::move(with_up));
 }
 
 Result<const Query*> QueryFrame::WithAllFeaturesForLog() {
@@ -612,7 +610,7 @@ Result<const Query*> QueryFrame::WithAllFeaturesForLog() {
     const auto any_work = std::make_shared<WorkBudget>();
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, any_work)
                                               : localizer_.QueryFromFeatures(features_, camera_, any_work));
-    for_log_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(query));
+    for_log_ = MakePooled<Query>(std::move(query));
   }
   return for_log_.get();
 }
@@ -622,7 +620,7 @@ Result<const Query*> QueryFrame::WithAllFeatures() {
     CAIRN_ASSIGN_OR_RETURN(Query query, grey_ ? localizer_.QueryFromImage(*grey_, camera_, work_)
                                               : localizer_.QueryFromFeatures(features_, camera_, work_));
     if (up_) CAIRN_RETURN_IF_ERROR(localizer_.SetUp(*up_, &query));
-    query_ = std::allocate_shared<Query>(PoolAllocator<Query>(), std::move(query));
+    query_ = MakePooled<Query>(std::move(query));
   }
   return query_.get();
 }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <span>
 
-#include "core/base/pooled.h"
-
 namespace cairn {
 
 size_t LandmarkSet::Position(LandmarkIdx landmark) const {

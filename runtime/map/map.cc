@@ -34,8 +34,9 @@ constexpr int64_t kWholeViews = -3;
 constexpr size_t kMaxNumSizesNamed = 10;
 
 int64_t NumBytes(const LandmarkSet& set) {
-  return static_cast<int64_t>(set.idx.size() * (sizeof(LandmarkIdx) + sizeof(MapLandmark))) +
-         set.descriptors.size() + set.packed.num_bytes();
+  return static_cast<int64_t>(PooledSize(set.idx.capacity() * sizeof(LandmarkIdx)) +
+                              PooledSize(set.landmarks.capacity() * sizeof(MapLandmark))) +
+         set.descriptors.num_bytes() + set.packed.num_bytes();
 }
 
 int64_t NumBytes(const AppearanceMap& appearance) {
@@ -275,7 +276,7 @@ Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {
 
 Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::span<const LandmarkIdx> landmarks,
                                                        bool packed) const {
-  auto set = std::allocate_shared<LandmarkSet>(PoolAllocator<LandmarkSet>());
+  auto set = MakePooled<LandmarkSet>();
   set->idx.assign(landmarks.begin(), landmarks.end());
   set->landmarks.reserve(set->idx.size());
   const DescriptorKind& kind = directory().descriptor_kind();

@@ -10,7 +10,6 @@
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
-#include "core/base/pooled.h"
 #include "core/blocks/map_head.h"
 #include "core/camera/camera.h"
 #include "core/seal/signing_key.h"

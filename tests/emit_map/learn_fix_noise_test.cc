@@ -1,5 +1,4 @@
 #include "stages/emit_map/learn_fix_noise.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 #include <optional>
@@ -7,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "runtime/localize/refine.h"
 

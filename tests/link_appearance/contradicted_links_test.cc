@@ -1,5 +1,4 @@
 #include "stages/link_appearance/contradicted_links.h"
-#include "core/base/pooled.h"
 
 #include <cstdio>
 #include <string>
@@ -8,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/camera/camera.h"
 #include "stages/link_appearance/link_appearance.h"
 

@@ -1,5 +1,4 @@
 #include "stages/match_features/pairs/select_pairs.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 #include <random>
@@ -8,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/base/pooled.h"
 #include "core/base/text.h"
 
 namespace cairn::match_features {

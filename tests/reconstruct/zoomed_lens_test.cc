@@ -1,5 +1,4 @@
 #include "stages/reconstruct/zoomed_lens.h"
-#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "core/geometry/relative_pose.h"
 

@@ -80,10 +80,11 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 }
 
 int64_t ImageFeatures::NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors) {
-  const int64_t row_bytes =
-      sizeof(Keypoint) + sizeof(Eigen::Vector3d) + (has_descriptors ? kind.num_values : 0);
+  const auto num = static_cast<size_t>(num_features);
+  const size_t num_values = has_descriptors ? kind.num_values : 0;
   return PackedDescriptors::NumBytes(num_features, kind.num_values) +
-         static_cast<int64_t>(PooledSize(row_bytes * num_features));
+         static_cast<int64_t>(PooledSize(num * sizeof(Keypoint)) + num * sizeof(Eigen::Vector3d) +
+                              PooledSize(num * num_values));
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,

@@ -15,12 +15,6 @@
 namespace cairn {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kKeeps = false;
-#else
-constexpr bool kKeeps = true;
-#endif
-
 constexpr size_t kMib = size_t{1} << 20;
 
 // An object of a thread that was made before its pool, and outlives it.
@@ -70,7 +64,7 @@ TEST(Pooled, SizesAreAnEighthApart) {
 }
 
 TEST(Pooled, WhatIsGivenBackIsTakenNext) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     for (const size_t num_bytes :
          {size_t{1}, size_t{64}, size_t{100}, size_t{1000}, size_t{4097}, 8 * kMib}) {
@@ -84,7 +78,7 @@ TEST(Pooled, WhatIsGivenBackIsTakenNext) {
 }
 
 TEST(Pooled, ALargerBlockWillDoButNotOneOfMoreThanTwice) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     void* const large = TakePooled(2048);
     GivePooled(large);
@@ -113,7 +107,7 @@ TEST(Pooled, BlocksInUseAreDifferent) {
 
 // Blocks of which so many are kept that more go back to the system: of those taken next as many are old.
 TEST(Pooled, NoMoreThan16MibAreKept) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     std::vector<void*> taken;
     for (int i = 0; i < 24; ++i) taken.push_back(TakePooled(kMib));
@@ -127,7 +121,7 @@ TEST(Pooled, NoMoreThan16MibAreKept) {
 }
 
 TEST(Pooled, WhatIsTakenAgainIsNoLongerCounted) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     void* const first = TakePooled(kMib);
     GivePooled(first);
@@ -139,7 +133,7 @@ TEST(Pooled, WhatIsTakenAgainIsNoLongerCounted) {
 }
 
 TEST(Pooled, LargerBlocksMakeRoomForSmallOnes) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     std::vector<void*> taken;
     for (int i = 0; i < 16; ++i) taken.push_back(TakePooled(kMib));
@@ -156,7 +150,7 @@ TEST(Pooled, LargerBlocksMakeRoomForSmallOnes) {
 }
 
 TEST(Pooled, TheLargestAreNotKept) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   InNewThread([] {
     GivePooled(TakePooled(8 * kMib + 1));
     GivePooled(TakePooled(100 * kMib));
@@ -168,7 +162,7 @@ TEST(Pooled, TheLargestAreNotKept) {
 }
 
 TEST(Pooled, AThreadThatEndsGivesAllBack) {
-  if (!kKeeps) GTEST_SKIP();
+  if (!KeepsPooled()) GTEST_SKIP();
   const auto num_in_use = [] {
     const struct mallinfo2 info = mallinfo2();
     return info.uordblks + info.hblkhd;
@@ -191,7 +185,7 @@ TEST(Pooled, AThreadThatEndsGivesAllBack) {
 TEST(Pooled, AnotherThreadMayGiveItBack) {
   void* memory = nullptr;
   InNewThread([&] { memory = TakePooled(1000); });
-  if (kKeeps) {
+  if (KeepsPooled()) {
     InNewThread([&] {
       GivePooled(memory);
       EXPECT_EQ(TakePooled(1000), memory);

@@ -1,10 +1,10 @@
 #include "core/camera/camera.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 #include "core/geometry/pose.h"
 

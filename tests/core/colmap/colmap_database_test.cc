@@ -1,5 +1,4 @@
 #include "core/colmap/colmap_database.h"
-#include "core/base/pooled.h"
 
 #include <chrono>
 #include <cstdlib>
@@ -10,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/files/file.h"
 
 namespace cairn {

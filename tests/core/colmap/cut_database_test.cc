@@ -1,5 +1,4 @@
 #include "core/colmap/cut_database.h"
-#include "core/base/pooled.h"
 
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/colmap/cameras_text.h"
 
 namespace cairn {

@@ -1,9 +1,9 @@
 #include "core/features/descriptor_matcher.h"
-#include "core/base/pooled.h"
 
 #include <gtest/gtest.h>
 #include <span>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 
 namespace cairn {

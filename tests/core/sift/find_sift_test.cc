@@ -1,5 +1,4 @@
 #include "core/sift/find_sift.h"
-#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/features2d.hpp>
 
+#include "core/base/pooled.h"
 #include "tests/core/sift/sift_pictures.h"
 
 namespace cairn {

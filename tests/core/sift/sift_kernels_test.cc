@@ -1,6 +1,5 @@
 // Without OpenCV, so that it is compiled for other processors too (test_on_aarch64.sh).
 #include "core/sift/sift_kernels.h"
-#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/sift/choose_kernels.h"
 #include "core/sift/gaussian.h"
 #include "tests/core/sift/wide_kernels.h"

@@ -1,5 +1,4 @@
 #include "stages/reconstruct/globally/adjust_model.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 #include <map>
@@ -7,8 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include "core/base/quantiles.h"
 
+#include "core/base/pooled.h"
+#include "core/base/quantiles.h"
 #include "core/base/random.h"
 
 namespace cairn::reconstruct {

@@ -1,11 +1,11 @@
 #include "runtime/drive/route.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/retrieve.h"
 #include "tests/runtime/localize/synthetic_room.h"

@@ -1,11 +1,11 @@
 #include "runtime/localize/estimate.h"
-#include "core/base/pooled.h"
 
 #include <algorithm>
 #include <iterator>
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 
 namespace cairn {

@@ -1,11 +1,11 @@
 #include "runtime/localize/localizer.h"
-#include "core/base/pooled.h"
 
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/files/file.h"
 #include "core/seal/map_seal.h"
 #include "runtime/localize/accept.h"

@@ -1,10 +1,10 @@
 #include "runtime/localize/place_evidence.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {

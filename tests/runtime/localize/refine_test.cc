@@ -1,9 +1,9 @@
 #include "runtime/localize/refine.h"
-#include "core/base/pooled.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/pooled.h"
 #include "core/base/random.h"
 
 namespace cairn {

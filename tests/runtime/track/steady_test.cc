@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/pooled.h"
 #include "core/features/sift.h"
 #include "runtime/track/region_tracker.h"
 #include "tests/runtime/localize/poster_scene.h"
@@ -51,9 +52,7 @@ long RequestsOf(const std::function<bool(int)>& has_fix_at_frame) {
 class Steady : public testing::Test {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "sanitizers get all memory back";
-#endif
+    if (!KeepsPooled()) GTEST_SKIP() << "sanitizers get all memory back";
     cv::setNumThreads(1);
     ImageOfFrame(0);
   }

@@ -1,11 +1,11 @@
 #include "sim/render/renderer.h"
-#include "core/base/pooled.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "core/base/pooled.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/features/sift.h"
 #include "sim/survey/survey.h"
