@@ -33,6 +33,7 @@ function(cairn_test name)
   cmake_parse_arguments(ARG "" "LABEL" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  target_precompile_headers(${name} REUSE_FROM cairn_test_headers)
   # Tests of one program may write files of one name: they run one after the other, in a folder of their own.
   set(folder ${CMAKE_BINARY_DIR}/tests_tmp/${name})
   file(MAKE_DIRECTORY ${folder})

@@ -86,7 +86,7 @@ class TwoDoors : public testing::Test {
   }
 
   // Takes the observations of an image out of some classes.
-  void Forget(ImageId image_id, int first, int last) {
+  void Forget(ImageId image_id, ClassId first, ClassId last) {
     for (FeatureClass& row : classes_.classes) {
       if (row.class_id % 100 < first || row.class_id % 100 > last) continue;
       std::erase_if(row.observations,

@@ -47,8 +47,8 @@ inline cv::Mat Wall(int width) {
 inline Recorded ImageOf(const cv::Mat& picture, int64_t time_ns, int64_t stamp_ns) {
   return {"/i", kImage, time_ns,
           ImageBytes({.stamp_ns = stamp_ns,
-                      .width = static_cast<uint32_t>(picture.cols),
-                      .height = static_cast<uint32_t>(picture.rows),
+                      .width = picture.cols,
+                      .height = picture.rows,
                       .pixels = std::string(picture.ptr<char>(), picture.total())})};
 }
 
