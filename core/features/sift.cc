@@ -1,6 +1,7 @@
 #include "core/features/sift.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -18,6 +19,37 @@ static_assert(kSiftDim == kSiftDescriptorDim);
 // Least scale of octave 1: half a layer above its level 0.
 constexpr double kOctaveOneScalePx = 1.7959392773;  // 1.6 * 2^(1/6)
 
+// The largest grey level than which a tenth of the pixels are not darker.
+int BrightLevel(const cv::Mat& grey, const cv::Mat& mask) {
+  constexpr int kRowStep = 4;  // the others are like them
+  std::array<int, 256> num_of_level{};
+  int64_t num = 0;
+  for (int y = 0; y < grey.rows; y += kRowStep) {
+    const uint8_t* const levels = grey.ptr<uint8_t>(y);
+    const uint8_t* const is_seen = mask.empty() ? nullptr : mask.ptr<uint8_t>(y);
+    for (int x = 0; x < grey.cols; ++x) {
+      if (is_seen != nullptr && is_seen[x] == 0) continue;
+      ++num_of_level[levels[x]];
+      ++num;
+    }
+  }
+  int level = 255;
+  for (int64_t num_above = num_of_level[level]; level > 0 && num_above * 10 < num;)
+    num_above += num_of_level[--level];
+  return level;
+}
+
+// What part of a contrast is left in a dark image, one whose brightest tenth, which a lamp or two are not, is
+// dark: less than in proportion, as an image in which that begins at kDarkLevel is no bright one.  A black
+// one shows nothing but noise, of which a search would make features.
+double ContrastLeft(const cv::Mat& grey, const cv::Mat& mask) {
+  constexpr int kDarkLevel = 80, kBlackLevel = 5;
+  constexpr double kLeast = 0.1;
+  const int level = BrightLevel(grey, mask);
+  if (level >= kDarkLevel || level < kBlackLevel) return 1;
+  return std::max(kLeast, level * level / double{kDarkLevel * kDarkLevel});
+}
+
 using IsWanted = std::function<bool(const Keypoint&)>;
 
 // `search`: which octaves, of the doubled image or not.
@@ -27,7 +59,7 @@ Features Extract(const cv::Mat& grey, const SiftOptions& options, const cv::Mat&
   features.descriptors.resize(0, kSiftDescriptorDim);
   if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
   search.max_num_features = options.max_num_features;
-  search.contrast_threshold = options.contrast_threshold;
+  search.contrast_threshold = options.contrast_threshold * ContrastLeft(grey, mask);
   search.edge_threshold = options.edge_threshold;
   if (is_wanted) {
     search.is_wanted = [&is_wanted](float x, float y, float size) {
@@ -73,7 +105,7 @@ OptionTable DescribeOptions(SiftOptions* options) {
            .max = 65536},
           {.name = "contrast_threshold",
            .value = &options->contrast_threshold,
-           .help = "least contrast of an extremum, grey levels / 255",
+           .help = "least contrast of an extremum, grey levels / 255; less in dark images",
            .min = 0,
            .max = 1},
           {.name = "edge_threshold",

@@ -1,10 +1,18 @@
 #include "core/features/sift.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "core/base/pooled.h"
+#include "core/sift/find_sift.h"
+#include "tests/core/sift/sift_pictures.h"
 
 namespace cairn {
 namespace {
@@ -83,6 +91,77 @@ TEST(ExtractSift, CappedFeaturesAreTheStrongestOfAllWithTies) {
       EXPECT_EQ(capped->keypoints[i].y, expected->keypoints[i].y);
     }
   }
+}
+
+// Of a picture whose brightest tenth begins at a grey level.
+cv::Mat PictureOfLevel(int level, double contrast = 0.3) {
+  cv::Mat picture;
+  RandomBlobs({200, 160}, 150, 1).convertTo(picture, CV_8U, contrast);
+  std::vector<uint8_t> levels;
+  for (int y = 0; y < picture.rows; y += 4)
+    levels.insert(levels.end(), picture.ptr<uint8_t>(y), picture.ptr<uint8_t>(y) + picture.cols);
+  // The 800th of 8,000 from the top.
+  std::nth_element(levels.begin(), levels.begin() + 799, levels.end(), std::greater<>());
+  return picture + cv::Scalar(level - levels[799]);
+}
+
+PooledVector<SiftFeature> FoundWithContrast(const cv::Mat& picture, double contrast_threshold) {
+  return FindSift(picture, {}, {.max_num_features = 2000, .contrast_threshold = contrast_threshold});
+}
+
+TEST(ExtractSift, LessContrastIsEnoughInADarkImageByTheSquareOfItsBrightestTenth) {
+  for (const auto& [level, contrast_threshold] :
+       {std::pair(200, 0.02), std::pair(81, 0.02), std::pair(80, 0.02), std::pair(72, 0.0162),
+        std::pair(60, 0.01125)}) {
+    const cv::Mat picture = PictureOfLevel(level);
+    const auto expected = FoundWithContrast(picture, contrast_threshold);
+    const auto features = ExtractSift(picture, {});
+    ASSERT_EQ(features->keypoints.size(), expected.size()) << level;
+    for (size_t i = 0; i < expected.size(); ++i)
+      EXPECT_EQ(features->keypoints[i].x, KeypointFromOpenCv(expected[i].x, 0, 0, 0).x) << level;
+    EXPECT_EQ(expected.size() > FoundWithContrast(picture, 0.02).size(), level < 80) << level;
+  }
+}
+
+TEST(ExtractSift, NoLessThanATenthOfTheContrastIsEnough) {
+  for (const auto& [level, ratio] : {std::pair(5, 0.1), std::pair(25, 0.1), std::pair(26, 0.105625)}) {
+    const cv::Mat picture = PictureOfLevel(level, 0.05);
+    const size_t num = ExtractSift(picture, {})->keypoints.size();
+    EXPECT_GT(num, 20u) << level;
+    EXPECT_EQ(num, FoundWithContrast(picture, 0.02 * ratio).size()) << level;
+  }
+}
+
+TEST(ExtractSift, BlackImagesHaveNoFeaturesOfNoise) {
+  cv::Mat noise;
+  Noise({200, 160}, 3).convertTo(noise, CV_8U, 5 / 256.0, -0.5);  // 0 to 4
+  EXPECT_TRUE(ExtractSift(noise, {})->keypoints.empty());
+  EXPECT_GT(FoundWithContrast(noise, 0.002).size(), 100u);
+}
+
+TEST(ExtractSift, WhatAMaskHidesMakesNoImageBright) {
+  const cv::Mat dark = PictureOfLevel(60);
+  cv::Mat picture = dark.clone(), mask(dark.size(), CV_8UC1, cv::Scalar(255));
+  picture.colRange(150, 200).setTo(255);
+  mask.colRange(140, 200).setTo(0);
+  const auto found = ExtractSift(picture, {}, mask);
+  const auto less = FindSift(picture, mask, {.contrast_threshold = 0.02});
+  EXPECT_GT(found->keypoints.size(), less.size());
+}
+
+TEST(ExtractSift, ATenthOfTheLightLeavesMostFeatures) {
+  const cv::Mat picture = RandomBlobs({400, 300}, 300, 2);
+  cv::Mat dark;
+  picture.convertTo(dark, CV_8U, 0.1);
+  const auto bright = ExtractSift(picture, {}), found = ExtractSift(dark, {});
+  EXPECT_LT(FoundWithContrast(dark, 0.02).size(), bright->keypoints.size() / 10);
+  size_t num_again = 0;
+  for (const Keypoint& keypoint : bright->keypoints) {
+    num_again += std::any_of(found->keypoints.begin(), found->keypoints.end(), [&](const Keypoint& other) {
+      return std::hypot(other.x - keypoint.x, other.y - keypoint.y) < 0.2 * keypoint.scale + 0.5;
+    });
+  }
+  EXPECT_GT(num_again, bright->keypoints.size() / 2);
 }
 
 TEST(ExtractSift, TinyImagesHaveNoFeatures) {
