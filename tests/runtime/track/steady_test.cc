@@ -1,14 +1,19 @@
 // A camera that is followed asks the system for no memory, frame by frame.
 #include <functional>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "core/base/pooled.h"
+#include "core/blocks/map_rows.h"
 #include "core/features/sift.h"
+#include "runtime/c_api/cairn.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/track/region_tracker.h"
+#include "tests/install/c_image.h"
 #include "tests/runtime/localize/poster_scene.h"
 #include "tests/runtime/track/count_requests.h"
 
@@ -119,6 +124,32 @@ TEST_F(Steady, WithinABudget) {
   options.budget_ms = 50;
   RegionTracker tracker = MakeTracker(options);
   EXPECT_EQ(RequestsOf([&](int i) { return HasFix(tracker.Track(ImageOfFrame(i), Poster().camera)); }), 0);
+}
+
+TEST_F(Steady, BySureTracker) {
+  SureTracker tracker = *SureTracker::Make(PosterMap(), PosterOptions(), {}, {});
+  EXPECT_EQ(RequestsOf([&](int i) { return HasFix(tracker.Track(ImageOfFrame(i), Poster().camera)); }), 0);
+}
+
+TEST_F(Steady, ThroughTheCApi) {
+  const std::string path = testing::TempDir() + "/steady.cairn";
+  ASSERT_TRUE(WriteMapRows(MakePosterMap(Poster()), path).ok());
+  cairn_map* map = nullptr;
+  cairn_tracker* tracker = nullptr;
+  ASSERT_EQ(cairn_map_open(path.c_str(), nullptr, &map), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_create(map, &tracker), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_set_option(tracker, "max_ratio", "0.95"), CAIRN_OK) << cairn_last_error();
+  cairn_camera camera = CAIRN_CAMERA_INIT;
+  ASSERT_EQ(cairn_map_camera_for_size(map, 320, 240, &camera), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(RequestsOf([&](int i) {
+              const cairn_image image = ImageOf(ImageOfFrame(i));
+              cairn_fix fix = CAIRN_FIX_INIT;
+              EXPECT_EQ(cairn_tracker_track(tracker, &image, &camera, &fix), CAIRN_OK) << cairn_last_error();
+              return fix.has_fix != 0;
+            }),
+            0);
+  EXPECT_EQ(cairn_tracker_destroy(tracker), CAIRN_OK);
+  EXPECT_EQ(cairn_map_close(map), CAIRN_OK);
 }
 
 // What no thread keeps for another comes from the system, once.
