@@ -11,7 +11,7 @@ LIBRARIES := libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecp
     libavformat-dev libavcodec-dev libavutil-dev libswscale-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev \
     liblz4-dev libbz2-dev zlib1g-dev libzip-dev \
-    coinor-libcbc-dev libgeos++-dev
+    libglpk-dev libgeos++-dev
 # Python's module:
 PACKAGES_PYTHON := pybind11-dev python3 python3-dev python3-numpy
 # Tests in C++:

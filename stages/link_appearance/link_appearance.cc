@@ -227,7 +227,8 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
       {"max_num_program_links", &bound.max_num_program_links,
        "auto: most links of a component with a program", 0},
       {"max_num_cut_rounds", &bound.max_num_cut_rounds, "program: most rounds of cuts before branching", 0},
-      {"max_num_branches", &bound.max_num_branches, "program: most nodes of the branching tree; 0: none", 0},
+      {"max_num_branches", &bound.max_num_branches,
+       "program: most parts of the search that fixes images; 0: none", 0},
   };
   const OptionTable ambiguity = DescribeOptions(&options->ambiguity);
   table.insert(table.end(), ambiguity.begin(), ambiguity.end());

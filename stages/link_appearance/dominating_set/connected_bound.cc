@@ -2,36 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-
-#include <CbcEventHandler.hpp>
-#include <CbcModel.hpp>
-#include <CglCutGenerator.hpp>
-#include <OsiClpSolverInterface.hpp>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "stages/link_appearance/dominating_set/counting_bound.h"
+#include "stages/link_appearance/dominating_set/linear_program.h"
 #include "stages/link_appearance/dominating_set/tree_cuts.h"
 
 namespace cairn::link_appearance {
 namespace {
 
-constexpr double kTolerance = 1e-3;  // of cuts and of rounding a bound up
+using Row = LinearProgram::Row;
+
+constexpr double kTolerance = 1e-3;  // of cuts, and of what is a whole number
 // Cuts of one round, the most violated ones.
 constexpr size_t kMaxCutsPerRound = 400;
-// Rows that do not bind are dropped each time the bound has risen by this much.
-constexpr double kRiseBetweenCleanups = 0.2;
-
-OsiRowCut Row(const std::vector<int>& columns, const std::vector<double>& values, double low, double high) {
-  OsiRowCut row;
-  row.setRow(static_cast<int>(columns.size()), columns.data(), values.data());
-  row.setLb(low);
-  row.setUb(high);
-  row.setGloballyValid(true);
-  return row;
-}
+// Rounds of cuts of each part of the search.
+constexpr int kMaxRoundsPerBranch = 10;
+// What to give up costs, in sizes of the known set: so much that it is no part of a cheap solution.
+constexpr int kGiveUpCost = 100;
 
 // The arcs into S also equal x(S) - y(arcs within S): the row with fewer entries is used.
-OsiRowCut RowOf(const TreeColumns& program, const TreeCut& cut) {
+Row RowOf(const TreeColumns& program, const TreeCut& cut) {
   const std::vector<char> inside = NodeMarks(program.num_nodes, cut.nodes);
   std::vector<int> entering, within;
   for (size_t a = 0; a < program.arcs.size(); ++a) {
@@ -39,75 +33,38 @@ OsiRowCut RowOf(const TreeColumns& program, const TreeCut& cut) {
     if (!inside[to]) continue;
     (from >= 0 && inside[from] ? within : entering).push_back(program.num_nodes + static_cast<int>(a));
   }
-  std::vector<int> columns;
-  std::vector<double> values;
+  Row row;
   if (entering.size() <= within.size() + cut.nodes.size()) {
-    columns = entering;
-    values.assign(columns.size(), 1);
+    row.columns = entering;
+    row.values.assign(entering.size(), 1);
     if (cut.reached >= 0) {
-      columns.push_back(cut.reached);
-      values.push_back(-1);
+      row.columns.push_back(cut.reached);
+      row.values.push_back(-1);
     }
   } else {
-    columns = within;
-    values.assign(columns.size(), -1);
+    row.columns = within;
+    row.values.assign(within.size(), -1);
     for (const NodeIdx node : cut.nodes) {
       if (node == cut.reached) continue;
-      columns.push_back(node);
-      values.push_back(1);
+      row.columns.push_back(node);
+      row.values.push_back(1);
     }
   }
-  return Row(columns, values, cut.reached < 0 ? 1 : 0, COIN_DBL_MAX);
+  row.low = cut.reached < 0 ? 1 : 0;
+  return row;
 }
 
 // y_uv + y_vu <= x_u: a link is in the tree once, and only with both ends.
-void AddLinkRows(const TreeColumns& program, const double* values, std::vector<OsiRowCut>* rows) {
+void AddLinkRows(const TreeColumns& program, const std::vector<double>& values, std::vector<Row>* rows) {
   for (int a = 0; a < program.num_link_arcs; a += 2) {
     const int column = program.num_nodes + a;
     const double both = values[column] + values[column + 1];
     for (const NodeIdx node : {program.arcs[a].from, program.arcs[a].to}) {
       if (both - values[node] <= kTolerance) continue;
-      rows->push_back(Row({column, column + 1, node}, {1, 1, -1}, -COIN_DBL_MAX, 0));
+      rows->push_back({.columns = {column, column + 1, node}, .values = {1, 1, -1}, .high = 0});
     }
   }
 }
-
-std::vector<OsiRowCut> FindRows(const AppearanceGraph& graph, const TreeColumns& program,
-                                const double* values) {
-  std::vector<OsiRowCut> rows;
-  AddLinkRows(program, values, &rows);
-  std::vector<TreeCut> cuts = FindTreeCuts(graph, program, values, 10 * kTolerance);
-  std::stable_sort(cuts.begin(), cuts.end(),
-                   [](const TreeCut& a, const TreeCut& b) { return a.violation > b.violation; });
-  if (cuts.size() > kMaxCutsPerRound) cuts.resize(kMaxCutsPerRound);
-  for (const TreeCut& cut : cuts) rows.push_back(RowOf(program, cut));
-  return rows;
-}
-
-// The same cuts in CBC's branching tree.
-class TreeCutGenerator : public CglCutGenerator {
- public:
-  TreeCutGenerator(const AppearanceGraph* graph, const TreeColumns* program)
-      : graph_(graph), program_(program) {}
-  void generateCuts(const OsiSolverInterface& solver, OsiCuts& cuts, const CglTreeInfo) override {
-    for (const OsiRowCut& row : FindRows(*graph_, *program_, solver.getColSolution())) cuts.insert(row);
-  }
-  CglCutGenerator* clone() const override { return new TreeCutGenerator(*this); }
-
- private:
-  const AppearanceGraph* graph_;
-  const TreeColumns* program_;
-};
-
-class StopWhenCancelled : public CbcEventHandler {
- public:
-  explicit StopWhenCancelled(const Progress* progress) : progress_(progress) {}
-  CbcAction event(CbcEvent) override { return progress_ && progress_->Cancelled() ? stop : noAction; }
-  CbcEventHandler* clone() const override { return new StopWhenCancelled(*this); }
-
- private:
-  const Progress* progress_;
-};
 
 // Nodes that some smallest set does not need: another node's neighbourhood contains theirs.
 std::vector<char> FindReplaceable(const AppearanceGraph& graph) {
@@ -134,72 +91,58 @@ class ProgramSolver {
   // The graph has one component, and one node does not suffice.
   ProgramSolver(const Domination& domination, int known_size, Progress* progress)
       : domination_(domination), known_size_(known_size), progress_(progress), program_(domination.graph()) {
-    lp_.messageHandler()->setLogLevel(0);
-    lp_.setHintParam(OsiDoReducePrint, true, OsiHintTry);
     AddColumns();
     AddRows();
   }
 
   // Rounds of cuts at the root.
   void Cut(int max_num_rounds) {
-    lp_.initialSolve();
-    Note(lp_.getObjValue());
-    const int num_fixed_rows = lp_.getNumRows();
-    double last_cleanup = lp_.getObjValue();
-    for (int round = 1; round <= max_num_rounds && !IsDone(); ++round) {
-      if (progress_ && progress_->Cancelled()) return;
-      const std::vector<OsiRowCut> rows = FindRows(domination_.graph(), program_, lp_.getColSolution());
-      if (rows.empty()) return;
-      // Rows that do not bind are dropped once the bound has risen, so that the same point does not
-      // occur again.
-      if (lp_.getObjValue() > last_cleanup + kRiseBetweenCleanups) {
-        DropLooseRows(num_fixed_rows);
-        last_cleanup = lp_.getObjValue();
-      }
-      std::vector<const OsiRowCut*> pointers;
-      for (const OsiRowCut& row : rows) pointers.push_back(&row);
-      lp_.applyRowCuts(static_cast<int>(pointers.size()), pointers.data());
-      lp_.resolve();
-      if (!lp_.isProvenOptimal()) return;
-      Note(lp_.getObjValue());
-    }
+    is_solved_ = lp_.Solve();
+    if (is_solved_) AddCuts(max_num_rounds);
+    if (is_solved_) bound_ = BoundOfProgram();
   }
 
+  // Best first: of the parts of all sets, which fix some nodes, the one whose bound is least is divided.
   void Branch(int max_num_branches) {
-    if (IsDone() || max_num_branches == 0 || (progress_ && progress_->Cancelled()) || !lp_.isProvenOptimal())
-      return;
-    for (NodeIdx node = 0; node < program_.num_nodes; ++node) lp_.setInteger(node);
-    CbcModel model(lp_);
-    model.setLogLevel(0);
-    model.setMaximumNodes(max_num_branches);
-    model.setCutoff(known_size_ - 0.5);
-    model.setDblParam(CbcModel::CbcCutoffIncrement, 0.999);
-    TreeCutGenerator generator(&domination_.graph(), &program_);
-    model.addCutGenerator(&generator, 1, "tree");
-    StopWhenCancelled stop(progress_);
-    model.passInEventHandler(&stop);
-    model.branchAndBound();
-    if (model.isProvenInfeasible() || (model.status() == 0 && model.bestSolution() == nullptr)) {
-      bound_ = known_size_;
-      return;
+    if (bound_ >= known_size_ || max_num_branches == 0 || !is_solved_) return;
+    std::set<Part> parts{{.bound = bound_}};
+    for (int num = 0; num < max_num_branches && !parts.empty() && !IsCancelled(); ++num) {
+      Part part = std::move(parts.extract(parts.begin()).value());
+      if (part.bound >= known_size_) return Close(known_size_);
+      const NodeIdx node = Explore(&part);
+      if (part.bound >= known_size_) continue;
+      if (node < 0) return Close(part.bound);  // it cannot be divided
+      for (const int value : {1, 0}) {
+        Part half{.bound = part.bound, .number = ++num_parts_, .fixed = part.fixed};
+        half.fixed.emplace_back(node, value);
+        parts.insert(std::move(half));
+      }
     }
-    Note(std::min(model.getBestPossibleObjValue(), static_cast<double>(known_size_)));
-    if (model.bestSolution() == nullptr) return;
-    std::vector<NodeIdx> nodes;
-    for (NodeIdx node = 0; node < program_.num_nodes; ++node) {
-      if (model.bestSolution()[node] > 0.5) nodes.push_back(node);
-    }
-    const std::vector<char> kept = NodeMarks(program_.num_nodes, nodes);
-    if (static_cast<int>(nodes.size()) < known_size_ && domination_.IsConnected(kept) &&
-        domination_.Undominated(kept).empty()) {
-      smaller_ = std::move(nodes);
-    }
+    Close(parts.empty() ? known_size_ : parts.begin()->bound);
   }
 
   int bound() const { return bound_; }
   const std::vector<NodeIdx>& smaller() const { return smaller_; }
 
  private:
+  // The sets with some nodes in or out.
+  struct Part {
+    int bound = 0;
+    int number = 0;
+    std::vector<std::pair<NodeIdx, int>> fixed;
+    // Of those that are as good the deepest, which are sets soonest.
+    friend bool operator<(const Part& a, const Part& b) {
+      const auto key = [](const Part& part) {
+        return std::tuple(part.bound, -static_cast<int>(part.fixed.size()), part.number);
+      };
+      return key(a) < key(b);
+    }
+  };
+
+  bool IsCancelled() const { return progress_ != nullptr && progress_->Cancelled(); }
+  int BoundOfProgram() const { return static_cast<int>(std::min<int64_t>(lp_.bound(), known_size_)); }
+  void Close(int bound) { bound_ = std::clamp(bound, bound_, known_size_); }
+
   void AddColumns() {
     const DominationOptions& options = domination_.options();
     std::vector<char> replaceable(program_.num_nodes, 0);
@@ -207,67 +150,134 @@ class ProgramSolver {
       replaceable = FindReplaceable(domination_.graph());
     }
     for (NodeIdx node = 0; node < program_.num_nodes; ++node) {
-      lp_.addCol(0, nullptr, nullptr, 0, replaceable[node] ? 0 : 1, 1);
+      tops_.push_back(replaceable[node] ? 0 : 1);
+      lp_.AddColumn(1, 0, tops_.back());
     }
     for (const auto& [from, to] : program_.arcs) {
       const bool is_out = (from >= 0 && replaceable[from]) || replaceable[to];
-      lp_.addCol(0, nullptr, nullptr, 0, is_out ? 0 : 1, 0);
+      lp_.AddColumn(0, 0, is_out ? 0 : 1);
     }
+    // To give up meets all rows: so that every part has a bound.
+    lp_.AddColumn(kGiveUpCost * known_size_, 0, 1);
+  }
+
+  void Add(std::vector<Row> rows) {
+    for (Row& row : rows) {
+      if (row.low.value_or(0) <= 0) continue;
+      row.columns.push_back(program_.size());
+      row.values.push_back(*row.low);
+    }
+    lp_.AddRows(rows);
   }
 
   void AddRows() {
     const AppearanceGraph& graph = domination_.graph();
     const int num_nodes = program_.num_nodes;
     std::vector<std::vector<int>> columns(num_nodes);  // arcs into a node
-    std::vector<int> roots;
+    Row root{.low = 1, .high = 1};
     for (size_t a = 0; a < program_.arcs.size(); ++a) {
       const int column = num_nodes + static_cast<int>(a);
       columns[program_.arcs[a].to].push_back(column);
-      if (program_.arcs[a].from < 0) roots.push_back(column);
+      if (program_.arcs[a].from < 0) root.columns.push_back(column);
     }
-    const auto add = [&](const std::vector<int>& row, const std::vector<double>& values, double low,
-                         double high) {
-      lp_.addRow(static_cast<int>(row.size()), row.data(), values.data(), low, high);
-    };
-    add(roots, std::vector<double>(roots.size(), 1), 1, 1);
+    root.values.assign(root.columns.size(), 1);
+    std::vector<Row> rows{root};
     for (NodeIdx node = 0; node < num_nodes; ++node) {
-      columns[node].push_back(node);
-      std::vector<double> values(columns[node].size(), 1);
-      values.back() = -1;
-      add(columns[node], values, 0, 0);
-      std::vector<int> neighbours;
-      std::vector<double> weights;
+      Row entered{.columns = columns[node], .low = 0, .high = 0};
+      entered.values.assign(entered.columns.size(), 1);
+      entered.columns.push_back(node);
+      entered.values.push_back(-1);
+      Row reached{.low = 1}, demand{.low = static_cast<int>(domination_.Demand(node))};
       for (const AppearanceGraph::Neighbour& n : graph.Neighbours(node)) {
-        neighbours.push_back(n.node);
-        weights.push_back(static_cast<double>(domination_.Weight(n.num_inliers)));
+        reached.columns.push_back(n.node);
+        demand.values.push_back(static_cast<int>(domination_.Weight(n.num_inliers)));
       }
-      add(neighbours, std::vector<double>(neighbours.size(), 1), 1, COIN_DBL_MAX);
-      neighbours.push_back(node);
-      weights.push_back(static_cast<double>(domination_.Demand(node)));
-      add(neighbours, weights, static_cast<double>(domination_.Demand(node)), COIN_DBL_MAX);
+      reached.values.assign(reached.columns.size(), 1);
+      demand.columns = reached.columns;
+      demand.columns.push_back(node);
+      demand.values.push_back(*demand.low);
+      rows.insert(rows.end(), {entered, reached, demand});
+    }
+    Add(rows);
+    num_fixed_rows_ = lp_.num_rows();
+    cleanup_bound_ = 0;
+  }
+
+  // Until no row is violated, or the bound is good enough.
+  void AddCuts(int max_num_rounds) {
+    for (int round = 0; round < max_num_rounds && BoundOfProgram() < known_size_ && !IsCancelled(); ++round) {
+      std::vector<Row> rows = FindRows();
+      if (rows.empty()) return;
+      // Rows that do not bind are dropped once the bound has risen, so that the same point does not
+      // occur again.
+      if (lp_.bound() > cleanup_bound_) {
+        lp_.DropLooseRows(num_fixed_rows_);
+        cleanup_bound_ = lp_.bound();
+      }
+      Add(std::move(rows));
+      is_solved_ = lp_.Solve();
+      if (!is_solved_) return;
     }
   }
 
-  void DropLooseRows(int num_fixed_rows) {
-    const CoinWarmStartBasis* basis = dynamic_cast<const CoinWarmStartBasis*>(lp_.getPointerToWarmStart());
-    std::vector<int> loose;
-    for (int row = num_fixed_rows; basis && row < lp_.getNumRows(); ++row) {
-      if (basis->getArtifStatus(row) == CoinWarmStartBasis::basic) loose.push_back(row);
-    }
-    if (!loose.empty()) lp_.deleteRows(static_cast<int>(loose.size()), loose.data());
+  std::vector<Row> FindRows() const {
+    std::vector<Row> rows;
+    AddLinkRows(program_, lp_.values(), &rows);
+    std::vector<TreeCut> cuts =
+        FindTreeCuts(domination_.graph(), program_, lp_.values().data(), 10 * kTolerance);
+    std::stable_sort(cuts.begin(), cuts.end(),
+                     [](const TreeCut& a, const TreeCut& b) { return a.violation > b.violation; });
+    if (cuts.size() > kMaxCutsPerRound) cuts.resize(kMaxCutsPerRound);
+    for (const TreeCut& cut : cuts) rows.push_back(RowOf(program_, cut));
+    return rows;
   }
 
-  void Note(double objective) {
-    bound_ = std::max(bound_, static_cast<int>(std::ceil(objective - kTolerance)));
-    bound_ = std::min(bound_, known_size_);
+  // Raises the bound of a part by its program, and takes the set that this may be.  The node by which it is
+  // divided; -1: there is none.
+  NodeIdx Explore(Part* part) {
+    for (NodeIdx node = 0; node < program_.num_nodes; ++node) lp_.SetRange(node, 0, tops_[node]);
+    for (const auto& [node, value] : part->fixed) lp_.SetRange(node, value, value);
+    cleanup_bound_ = 0;
+    is_solved_ = lp_.Solve();
+    if (is_solved_) AddCuts(kMaxRoundsPerBranch);
+    if (!is_solved_) return -1;
+    part->bound = std::max(part->bound, BoundOfProgram());
+    if (part->bound >= known_size_) return -1;
+    NodeIdx most_open = -1;
+    double least = 0.5 - kTolerance;
+    std::vector<NodeIdx> nodes;
+    for (NodeIdx node = 0; node < program_.num_nodes; ++node) {
+      const double value = lp_.values()[node];
+      if (value > 0.5) nodes.push_back(node);
+      if (std::abs(value - 0.5) < least) {
+        least = std::abs(value - 0.5);
+        most_open = node;
+      }
+    }
+    TakeSet(std::move(nodes));
+    if (part->bound >= known_size_) most_open = -1;
+    return most_open;
   }
-  bool IsDone() const { return bound_ >= known_size_; }
+
+  void TakeSet(std::vector<NodeIdx> nodes) {
+    const std::vector<char> kept = NodeMarks(program_.num_nodes, nodes);
+    if (static_cast<int>(nodes.size()) >= known_size_ || !domination_.IsConnected(kept) ||
+        !domination_.Undominated(kept).empty())
+      return;
+    known_size_ = static_cast<int>(nodes.size());
+    smaller_ = std::move(nodes);
+  }
 
   const Domination& domination_;
-  const int known_size_;
+  int known_size_;
   Progress* const progress_;
   const TreeColumns program_;
-  OsiClpSolverInterface lp_;
+  LinearProgram lp_;
+  std::vector<int> tops_;  // of nodes
+  int num_fixed_rows_ = 0;
+  int64_t cleanup_bound_ = 0;  // of the program when loose rows were dropped last
+  bool is_solved_ = false;
+  int num_parts_ = 0;
   int bound_ = 0;
   std::vector<NodeIdx> smaller_;
 };

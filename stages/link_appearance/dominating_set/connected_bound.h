@@ -17,7 +17,7 @@ struct ConnectedBoundOptions {
   int max_num_program_links = 1000;
   // Most rounds of cuts before branching.  REQUIRES: >= 0
   int max_num_cut_rounds = 60;
-  // Most nodes of the branching tree; 0: the linear program alone.  REQUIRES: >= 0
+  // Most parts of the search; 0: the linear program alone.  REQUIRES: >= 0
   int max_num_branches = 200;
 };
 
@@ -39,7 +39,8 @@ struct ConnectedBound {
 //                           would be cut off
 //   x binary, y >= 0.
 // Constraints are added for the sets S that the linear program's solutions violate (tree_cuts.h), at the root
-// and in the branching tree of CBC.  Links matter: two linked nodes dominate their common neighbours twice,
+// and in each part of a best-first search that fixes nodes.  Its bounds are proved in whole numbers
+// (linear_program.h).  Links matter: two linked nodes dominate their common neighbours twice,
 // so that this bound is well above that of domination or of separating node sets alone.  Where one dominator
 // suffices and all links count alike (m = 1), a node whose neighbours are all neighbours of another one is
 // left out.
