@@ -98,8 +98,9 @@ class ProgramSolver {
   // Rounds of cuts at the root.
   void Cut(int max_num_rounds) {
     is_solved_ = lp_.Solve();
-    if (is_solved_) AddCuts(max_num_rounds);
-    if (is_solved_) bound_ = BoundOfProgram();
+    if (!is_solved_) return;
+    AddCuts(max_num_rounds);
+    bound_ = BoundOfProgram();
   }
 
   // Best first: of the parts of all sets, which fix some nodes, the one whose bound is least is divided.
