@@ -24,7 +24,9 @@ left_out=(ProgramPath.IsThisProgramsOwnFile)
   Localizer.TheErrorOfTheMapsScaleIsInTheCovariance Localizer.ALookAlikeForWhichNoWorkIsLeftIsNotExcluded
   ModelLandmarks.LearnsHowFarATurnMovesTheImage ModelLandmarks.LevelsTheHeightsOfACarriedSurvey
   ModelLandmarks.LevelsWhatTiltedCamerasSaw PosteriorOnLattice.IsThatOfBruteForce
-  CPlaces.* CServo.* CStarts.* CAtlas.*)
+  CPlaces.* CServo.* CStarts.* CAtlas.*
+  CTrackers.OnTheFloor* CTrackers.AfterAnErrorTheyAreAsBefore CTrackers.OptionsAreThoseThatTheTrackerReadsAndBeginAnew
+  Steady.ByAllFeaturesOfImages Steady.WithinABudget Steady.EachThreadForItself Steady.BySureTracker)
 filter=-$(IFS=:; echo "${left_out[*]}")
 export filter
 
