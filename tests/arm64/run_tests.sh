@@ -26,7 +26,7 @@ left_out=(ProgramPath.IsThisProgramsOwnFile)
   ModelLandmarks.LevelsWhatTiltedCamerasSaw PosteriorOnLattice.IsThatOfBruteForce
   CPlaces.* CServo.* CStarts.* CAtlas.*
   CTrackers.OnTheFloor* CTrackers.AfterAnErrorTheyAreAsBefore CTrackers.OptionsAreThoseThatTheTrackerReadsAndBeginAnew
-  Steady.ByAllFeaturesOfImages Steady.WithinABudget Steady.EachThreadForItself Steady.BySureTracker)
+  Steady.ByImages Steady.ByAllFeaturesOfImages Steady.ByGivenFeatures Steady.WithinABudget Steady.EachThreadForItself Steady.BySureTracker)
 filter=-$(IFS=:; echo "${left_out[*]}")
 export filter
 
