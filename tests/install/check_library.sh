@@ -4,7 +4,7 @@ set -eu
 library=$1 c_symbols=$2 c_header=$3
 
 needed=$(readelf -d "$library" | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p')
-for unwanted in colmap ceres geos glpk imgcodecs tomlplusplus spdlog yaml CLI exif; do
+for unwanted in colmap ceres geos glpk CBC Cbc imgcodecs tomlplusplus spdlog yaml CLI exif; do
   if ldd "$library" | grep -i "lib[a-z_]*$unwanted"; then
     echo "$library pulls in $unwanted, which robots do not need" >&2
     exit 1

@@ -158,7 +158,7 @@ TEST(LinearProgram, IsSolvedAgainAfterRowsAndRangesChanged) {
 }
 
 TEST(LinearProgram, RowsThatDoNotBindAreDropped) {
-  // min x0 + x1 with x0 + 2 x1 >= 3, and, later, three rows, of which the second binds: x0 >= 1.
+  // min x0 + x1 with x0 + 2 x1 >= 3, and, later, three rows, of which the second binds: x0 >= 2.
   Program program{.columns = {{1, 0, 5}, {1, 0, 5}},
                   .rows = {{.columns = {0, 1}, .values = {1, 2}, .low = 3}}};
   LinearProgram made = Made(program);

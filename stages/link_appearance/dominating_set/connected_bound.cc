@@ -199,9 +199,8 @@ class ProgramSolver {
       demand.values.push_back(*demand.low);
       rows.insert(rows.end(), {entered, reached, demand});
     }
-    Add(rows);
+    Add(std::move(rows));
     num_fixed_rows_ = lp_.num_rows();
-    cleanup_bound_ = 0;
   }
 
   // Until no row is violated, or the bound is good enough.

@@ -178,6 +178,14 @@ TEST(ExtractSift, ColourImageIsAnError) {
   EXPECT_EQ(ExtractSift(cv::Mat(), {}).error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(KeypointFromOpenCv, IsInColmapsPixelsSigmaAndRadians) {
+  const Keypoint keypoint = KeypointFromOpenCv(10, 20, 6, 90);
+  EXPECT_FLOAT_EQ(keypoint.x, 10.25f);
+  EXPECT_FLOAT_EQ(keypoint.y, 20.25f);
+  EXPECT_FLOAT_EQ(keypoint.scale, 3);
+  EXPECT_FLOAT_EQ(keypoint.orientation, static_cast<float>(M_PI / 2));
+}
+
 // The keypoint nearest to a place.
 Keypoint NearestTo(double x, double y, const Features& features) {
   EXPECT_FALSE(features.keypoints.empty());
