@@ -16,10 +16,14 @@ struct SchurSolverOptions {
   double parameter_tolerance = 1e-8;
   // How far the first step is trusted: the less, the more it is damped.  REQUIRES: > 0
   double initial_trust_region_radius = 1e4;
+  // Each point is placed anew by what a step makes of all else before the step is judged, until that lowers
+  // the cost by less than a millionth: otherwise a few points that are weakly determined make it fail for all
+  // [Ceres, "Inner iterations"].
+  bool points_follow = false;
   // The result does not depend on it.
   int num_threads = 0;
-  // Advanced by max_num_iterations: by 1 for each, and at the end by what is left.  The solver ends when it
-  // is cancelled.  Null: nothing is.
+  // Advanced by max_num_iterations: by 1 for each, and at the end by what is left, unless it is cancelled.
+  // Then the solver ends.  Null: nothing is.
   Progress* progress = nullptr;
 };
 

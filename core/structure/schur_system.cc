@@ -228,6 +228,15 @@ void SchurSystem::ForEachOther(int residual, const Body& body) const {
   }
 }
 
+void SchurSystem::AddTransposed(int residual, const Eigen::VectorXd& weights, Eigen::VectorXd* side) const {
+  ForEachOther(residual, [&](int position, const double* jacobian) {
+    for (int k = 0; k < terms_.NumRows(residual); ++k) {
+      for (int c = 0; c < cholesky_->size(position); ++c)
+        (*side)[cholesky_->first_row(position) + c] += *jacobian++ * weights[k];
+    }
+  });
+}
+
 bool SchurSystem::EliminatePoint(int point, const Eigen::VectorXd& damping) {
   const size_t slots_begin = slot_begin_[point], slots_end = slot_begin_[point + 1];
   Eigen::Matrix3d square = Eigen::Matrix3d::Zero();

@@ -37,6 +37,16 @@ class SchurSystem {
   // The step for which (H + diag(damping)) step = -gradient.  False: the matrix is not positive definite.
   bool Solve(const Eigen::VectorXd& damping, Eigen::VectorXd* step);
 
+  // Of free blocks other than points: the number of their rows, and where those of one begin.
+  Eigen::Index num_rows() const { return cholesky_->num_rows(); }
+  Eigen::Index first_row(int block) const {
+    return cholesky_->first_row(cholesky_->position_of(terms_.index_of(block)));
+  }
+  // side += J^T weights over the rows of a residual, by these blocks.
+  void AddTransposed(int residual, const Eigen::VectorXd& weights, Eigen::VectorXd* side) const;
+  // Of the reduced matrix times x = side, in place.  REQUIRES: Solve() returned true
+  void SolveReduced(Eigen::VectorXd* side) const { cholesky_->Solve(side); }
+
  private:
   BlockCholesky MakeCholesky() const;
   void OrderSlots();

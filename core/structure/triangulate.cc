@@ -75,6 +75,22 @@ std::vector<std::pair<int, int>> SpreadPairs(int n) {
   return chosen;
 }
 
+// The largest angle at the position between two inliers.
+double MaxAngleDeg(const Triangulation& triangulation, const std::vector<Line>& lines) {
+  std::vector<Eigen::Vector3d> ways;
+  std::vector<double> lengths;
+  double min_cosine = 1;
+  for (const int i : triangulation.inliers) {
+    const Eigen::Vector3d way = triangulation.position - lines[i].center;
+    const double length = way.norm();
+    for (size_t k = 0; k < ways.size(); ++k)
+      min_cosine = std::min(min_cosine, ways[k].dot(way) / (lengths[k] * length));
+    ways.push_back(way);
+    lengths.push_back(length);
+  }
+  return DegFromRad(std::acos(std::clamp(min_cosine, -1.0, 1.0)));
+}
+
 }  // namespace
 
 Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOptions& options) {
@@ -115,14 +131,7 @@ Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOp
   }
   if (static_cast<int>(result.inliers.size()) < options.min_num_observations) return result;
 
-  double min_cosine = 1;
-  for (const int i : result.inliers) {
-    for (const int j : result.inliers) {
-      const Eigen::Vector3d a = result.position - lines[i].center, b = result.position - lines[j].center;
-      min_cosine = std::min(min_cosine, a.dot(b) / (a.norm() * b.norm()));
-    }
-  }
-  if (DegFromRad(std::acos(std::clamp(min_cosine, -1.0, 1.0))) < options.min_triangulation_angle_deg) {
+  if (MaxAngleDeg(result, lines) < options.min_triangulation_angle_deg) {
     result.outcome = TriangulateOutcome::kSmallAngle;
     return result;
   }

@@ -1,5 +1,10 @@
 #include "stages/group_classes/adjust/bundle.h"
 
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <ceres/ceres.h>
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
@@ -90,24 +95,80 @@ TEST(AdjustBundle, EvidenceCountsWhatKeypointsDetermine) {
   }
 }
 
+// One row, of a point where it has one, and of three other parameters in two blocks.
+class LinearCost : public ceres::CostFunction {
+ public:
+  LinearCost(bool has_point, std::vector<double> row) : row_(std::move(row)) {
+    set_num_residuals(1);
+    if (has_point) mutable_parameter_block_sizes()->push_back(3);
+    for (const int size : {1, 2}) mutable_parameter_block_sizes()->push_back(size);
+  }
+  bool Evaluate(double const* const* parameters, double* residual, double** jacobians) const override {
+    residual[0] = 1;
+    for (size_t b = 0, k = 0; b < parameter_block_sizes().size(); ++b) {
+      for (int i = 0; i < parameter_block_sizes()[b]; ++i, ++k) {
+        residual[0] += parameters[b][i] * row_[k];
+        if (jacobians != nullptr && jacobians[b] != nullptr) jacobians[b][i] = row_[k];
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::vector<double> row_;
+};
+
 TEST(ReducedSystem, TracesAndCovariancesAreThoseOfTheWholeSystem) {
-  // Two points, three other parameters; rows of keypoints, then rows of the others alone.
+  // Two points, three other parameters; rows of the others alone, then rows of keypoints.
   Random random(2);
   constexpr int kRows = 24, kColumns = 9;
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(kRows, kColumns);
+  std::vector<double> values(kColumns, 0);
+  std::vector<std::unique_ptr<LinearCost>> costs;
+  SchurProblem problem;
+  for (const int point : {0, 1}) problem.AddPoint(&values[3 * point]);
+  const int first = problem.AddBlock(&values[6], 1), second = problem.AddBlock(&values[7], 2);
   for (int row = 0; row < kRows; ++row) {
     const bool has_point = row >= 4;
+    const int point = row % 2;
     for (int c = 6; c < kColumns; ++c) dense(row, c) = random.Normal(0, 1);
-    for (int c = 0; c < 3 && has_point; ++c) dense(row, 3 * (row % 2) + c) = random.Normal(0, 1);
+    for (int c = 0; c < 3 && has_point; ++c) dense(row, 3 * point + c) = random.Normal(0, 1);
+    std::vector<double> of_row;
+    for (int c = has_point ? 3 * point : 3 * point + 3; c < 3 * point + 3; ++c)
+      of_row.push_back(dense(row, c));
+    for (int c = 6; c < kColumns; ++c) of_row.push_back(dense(row, c));
+    costs.push_back(std::make_unique<LinearCost>(has_point, std::move(of_row)));
+    if (has_point) {
+      problem.AddResidual(costs.back().get(), nullptr, {point, first, second});
+    } else {
+      problem.AddResidual(costs.back().get(), nullptr, {first, second});
+    }
   }
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> sparse = dense.sparseView();
-  const ReducedSystem system(sparse, 2);
+  const ReducedSystem system(problem, 2);
   ASSERT_TRUE(system.ok());
   const Eigen::MatrixXd covariance = (dense.transpose() * dense).inverse();
-  EXPECT_LT((system.Covariance(1, 2) - covariance.block<2, 2>(7, 7)).norm(), 1e-6 * covariance.norm());
+  EXPECT_LT((system.Covariance(first) - covariance.block<1, 1>(6, 6)).norm(), 1e-6 * covariance.norm());
+  EXPECT_LT((system.Covariance(second) - covariance.block<2, 2>(7, 7)).norm(), 1e-6 * covariance.norm());
   const Eigen::MatrixXd rows = dense.topRows(4);
-  EXPECT_NEAR(system.Trace({0, 1, 2, 3}), (rows * covariance * rows.transpose()).trace(), 0.25);
-  EXPECT_NEAR(system.Trace({2}), (rows.row(2) * covariance * rows.row(2).transpose())(0, 0), 1e-6);
+  const auto trace = [&](std::vector<ReducedSystem::Row> of) { return system.Trace(of); };
+  EXPECT_NEAR(trace({{0, 0}, {1, 0}, {2, 0}, {3, 0}}), (rows * covariance * rows.transpose()).trace(), 0.25);
+  EXPECT_NEAR(trace({{2, 0}}), (rows.row(2) * covariance * rows.row(2).transpose())(0, 0), 1e-6);
+  EXPECT_EQ(system.ValueOf({5, 0}), 1);
+}
+
+TEST(ReducedSystem, WhatNothingDeterminesIsNoError) {
+  std::vector<double> values(2, 0);
+  const LinearCost cost(false, {1, 0, 2});
+  SchurProblem problem;
+  double seen = 0, partly[2] = {0, 0};
+  problem.AddBlock(&seen, 1);
+  problem.AddBlock(partly, 2);
+  problem.AddResidual(&cost, nullptr, {0, 1});
+  const int unseen = problem.AddBlock(values.data(), 2);
+  const ReducedSystem system(problem, 1);
+  ASSERT_TRUE(system.ok());
+  EXPECT_GE(system.Covariance(unseen).trace(), 1);
+  EXPECT_NEAR(system.Trace(std::vector<ReducedSystem::Row>{{0, 0}}), 1, 1e-6);
 }
 
 }  // namespace

@@ -59,7 +59,8 @@ class SurveyAdjuster {
         bundle_options_{.max_num_iterations = options.max_num_iterations,
                         .function_tolerance = kLearningTolerance,
                         .solved = solved,
-                        .cancel = &progress},
+                        .cancel = &progress,
+                        .num_threads = num_threads},
         num_threads_(num_threads),
         progress_(progress),
         posed_(*posed) {
@@ -96,9 +97,9 @@ class SurveyAdjuster {
     LeftOutErrors as_stated, adjusted;
     ParallelFor(2, num_threads_, [&](int64_t i) {
       if (i == 0) {
-        as_stated = LeaveOut(bundle_options_, AsStated(problem_.camera_from_given));
+        as_stated = LeaveOut(OneOf(2), AsStated(problem_.camera_from_given));
       } else {
-        adjusted = LeaveOut(bundle_options_, problem_);
+        adjusted = LeaveOut(OneOf(2), problem_);
       }
     });
     const LeftOutGain gain = GainOf(problem_, as_stated, adjusted, -1);
@@ -272,22 +273,24 @@ class SurveyAdjuster {
     problem_.observations.clear();
     problem_.points.clear();
     scales_.clear();
+    std::vector<TrackElement> seen;  // per observation
     for (size_t t = 0; t < selected_.size(); ++t) {
       if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
-      const int point_idx = static_cast<int>(problem_.points.size());
-      problem_.points.push_back(triangulations[t].position);
       for (const int i : Spread(triangulations[t].inliers)) {
         const TrackElement& element = selected_[t][i];
         const Keypoint& keypoint = KeypointOf(element);
-        BundleProblem::Observation observation;
+        BundleProblem::Observation& observation = problem_.observations.emplace_back();
         observation.image_idx = element.image_idx;
-        observation.point_idx = point_idx;
+        observation.point_idx = static_cast<int>(problem_.points.size());
         observation.pixel = {keypoint.x, keypoint.y};
-        observation.ray = RayOfTrack(matched_, posed_, element);
-        problem_.observations.push_back(std::move(observation));
+        seen.push_back(element);
         scales_.push_back(keypoint.scale);
       }
+      problem_.points.push_back(triangulations[t].position);
     }
+    ForEachObservation(&problem_, [&](size_t k, BundleProblem::Observation* observation) {
+      observation->ray = RayOfTrack(matched_, posed_, seen[k]);
+    });
     SetCameras(variants_, false, &problem_);
     SetKeypointNoise();
   }
@@ -318,16 +321,27 @@ class SurveyAdjuster {
       block.difference_sigma = variant.difference_sigma;
       if (block.difference_sigma > 0) block.difference_prior = block.prior[0] - block.prior[1];
     }
-    for (BundleProblem::Observation& observation : problem->observations) {
-      const int c = problem->images[observation.image_idx].camera_idx;
+    ForEachObservation(problem, [&](size_t, BundleProblem::Observation* observation) {
+      const int c = problem->images[observation->image_idx].camera_idx;
       const Camera& camera = afresh ? candidates_[c][variants[c]].camera : posed_.cameras[c];
       if (afresh) {
-        if (const auto ray = MakePixelRay(camera, observation.pixel)) observation.ray = *ray;
+        if (const auto ray = MakePixelRay(camera, observation->pixel)) observation->ray = *ray;
       }
-      observation.camera = {};
+      observation->camera = {};
       if (!problem->cameras[c].free.empty())
-        observation.camera = SensitivityOf(camera, observation.pixel, problem->cameras[c].free);
-    }
+        observation->camera = SensitivityOf(camera, observation->pixel, problem->cameras[c].free);
+    });
+  }
+
+  // set(k, &observation) for each of a problem's, on all threads.
+  template <typename Set>
+  void ForEachObservation(BundleProblem* problem, const Set& set) const {
+    constexpr size_t kAtOnce = 256;
+    std::vector<BundleProblem::Observation>& observations = problem->observations;
+    ParallelFor((std::ssize(observations) + kAtOnce - 1) / kAtOnce, num_threads_, [&](int64_t chunk) {
+      const size_t begin = chunk * kAtOnce, end = std::min(begin + kAtOnce, observations.size());
+      for (size_t k = begin; k < end; ++k) set(k, &observations[k]);
+    });
   }
 
   // An adjustment that finds poses and focal length together makes that too long: a longer one moves pixels
@@ -377,10 +391,11 @@ class SurveyAdjuster {
     }
   }
 
-  LeftOutErrors TryVariants(const std::vector<int>& variants) const {
-    BundleProblem problem = problem_;
-    SetCameras(variants, true, &problem);
-    return LeaveOut(bundle_options_, std::move(problem));
+  // Options of one of several adjustments that are made one beside the other.
+  BundleOptions OneOf(int num_adjustments) const {
+    BundleOptions options = bundle_options_;
+    options.num_threads = std::max(1, NumThreads(num_threads_) / num_adjustments);
+    return options;
   }
 
   // The problem with the poses that are stated, and this offset.
@@ -406,7 +421,9 @@ class SurveyAdjuster {
       std::vector<int> variants;
       for (const auto& of_camera : candidates_)
         variants.push_back(static_cast<int>(std::min<size_t>(v, of_camera.size() - 1)));
-      tried[v] = TryVariants(variants);
+      BundleProblem problem = problem_;
+      SetCameras(variants, true, &problem);
+      tried[v] = LeaveOut(OneOf(static_cast<int>(num_variants)), std::move(problem));
     });
     bool changed = false;
     for (size_t c = 0; c < candidates_.size(); ++c) {

@@ -94,8 +94,10 @@ struct BundleOptions {
   SolvedFile* solved = nullptr;
   // Stops between two steps when it is cancelled, with no meaning; null: never.
   const Progress* cancel = nullptr;
-  // Advanced by each step; null: nothing is.
+  // Advanced by 1 for each step, and by those that were not needed; null: nothing is.
   Progress* steps = nullptr;
+  // The result does not depend on it.
+  int num_threads = 1;
 };
 
 // Reprojection error of an observation, px.
@@ -107,8 +109,8 @@ Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Ob
 //   + sum_i |D_i D_i-1^-1 (G_i G_i-1^-1)^-1|^2 / (walk^2 way_i)            drift of the stated poses G_i
 //   + |O|^2 / offset^2 + |c - prior|^2 / sigma^2
 // with reprojection residuals r (core/camera/pixel_ray.h), which a camera changes as CameraSensitivity says.
-// D of the first image is fixed.  Ceres, analytic derivatives, points eliminated (Schur), CHOLMOD, one
-// thread: bit-stable.  Returns whether it converged.  `evidence` may be null.
+// D of the first image is fixed.  Analytic derivatives, points eliminated (core/structure/schur_solver.h).
+// Returns whether it converged.  `evidence` may be null.
 bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence);
 
 }  // namespace cairn::group_classes

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <vector>
+#include <span>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Sparse>
+
+#include "core/structure/schur_system.h"
 
 namespace cairn::group_classes {
 
@@ -12,23 +12,29 @@ namespace cairn::group_classes {
 // their matrix is the covariance of everything else.
 class ReducedSystem {
  public:
-  // `jacobian`: whitened; its first 3 * num_points columns are those of points.  Dense, of as many rows as
-  // there are other columns: for some hundred images.
-  ReducedSystem(const Eigen::Ref<const Eigen::SparseMatrix<double, Eigen::RowMajor>>& jacobian,
-                int num_points);
+  // A row of a residual.
+  struct Row {
+    int residual = 0, row = 0;
+  };
 
-  bool ok() const { return factors_.info() == Eigen::Success; }
+  // At the problem's values.
+  ReducedSystem(const SchurProblem& problem, int num_threads);
 
-  // trace(J H^-1 J') over rows of the jacobian that have no point, by 16 vectors of random signs
-  // [Hutchinson 1990]: of so many of the residuals, as many are determined by themselves.
-  double Trace(const std::vector<int>& rows) const;
+  bool ok() const { return is_solved_; }
+  // Its value, whitened.
+  double ValueOf(const Row& row) const { return system_.terms().Residual(row.residual)[row.row]; }
 
-  // Covariance of `size` parameters from column `first` (counted behind the points').
-  Eigen::MatrixXd Covariance(int first, int size) const;
+  // trace(J H^-1 J') over rows that no point has, by 16 vectors of random signs [Hutchinson 1990]: of so many
+  // of the residuals, as many are determined by themselves.  REQUIRES: ok()
+  double Trace(std::span<const Row> rows) const;
+
+  // Covariance of a block's parameters, in tangent space.  REQUIRES: ok(); a free block
+  Eigen::MatrixXd Covariance(int block) const;
 
  private:
-  Eigen::SparseMatrix<double, Eigen::RowMajor> others_;  // columns behind the points'
-  Eigen::LLT<Eigen::MatrixXd> factors_;
+  int num_threads_;
+  SchurSystem system_;
+  bool is_solved_ = false;
 };
 
 }  // namespace cairn::group_classes

@@ -177,17 +177,28 @@ ceres::Solver::Summary SolveCeres(const SchurSolverOptions& options, Scene* scen
   ceres_options.max_num_iterations = options.max_num_iterations;
   ceres_options.function_tolerance = options.function_tolerance;
   ceres_options.initial_trust_region_radius = options.initial_trust_region_radius;
+  if (options.points_follow) {
+    ceres_options.use_inner_iterations = true;
+    ceres_options.inner_iteration_tolerance = 1e-6;
+    ceres_options.inner_iteration_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (Eigen::Vector3d& point : scene->points) {
+      if (problem.HasParameterBlock(point.data()))
+        ceres_options.inner_iteration_ordering->AddElementToGroup(point.data(), 0);
+    }
+  }
   return SolveOnOneThread(ceres_options, &problem);
 }
 
 // Step by step: costs, trust, values.
-void ExpectCeresSteps(const Scene& how, double initial_trust_region_radius = 1e4) {
+void ExpectCeresSteps(const Scene& how, double initial_trust_region_radius = 1e4,
+                      bool points_follow = false) {
   const Scene start = MakeScene(how);
   for (int num_steps = 0; num_steps < 9; ++num_steps) {
     Scene ours = start, theirs = start;
     const SchurSolverOptions options{.max_num_iterations = num_steps,
                                      .function_tolerance = 1e-9,
                                      .initial_trust_region_radius = initial_trust_region_radius,
+                                     .points_follow = points_follow,
                                      .num_threads = 2};
     const SchurSummary summary = SolveOurs(options, &ours);
     const ceres::Solver::Summary expected = SolveCeres(options, &theirs);
@@ -215,6 +226,11 @@ TEST(SchurScene, GoesCeresWayWithRobustLosses) { ExpectCeresSteps({.is_robust = 
 TEST(SchurScene, GoesCeresWayWithFreeCameras) {
   ExpectCeresSteps({.are_cameras_free = true, .held = {0, 1}});
   ExpectCeresSteps({.is_robust = true, .are_cameras_free = true, .held = {0, 1}});
+}
+
+TEST(SchurScene, PointsFollowAsCeresInnerIterations) {
+  ExpectCeresSteps({.held = {0, 1}}, 1e4, true);
+  ExpectCeresSteps({.is_robust = true, .are_cameras_free = true, .held = {0, 1}}, 1e-1, true);
 }
 
 TEST(SchurScene, FindsCeresOptimumWithinBounds) {
