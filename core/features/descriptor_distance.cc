@@ -18,6 +18,18 @@ CAIRN_WIDE_CLONES int32_t SiftDot(const uint8_t* a, const uint8_t* b) {
   return dot;
 }
 
+CAIRN_WIDE_CLONES void SiftDots(const uint8_t* a, const uint8_t* all, const int32_t* rows, size_t num_rows,
+                                int32_t* dots) {
+  int16_t wide[kSiftDescriptorDim];
+  for (int d = 0; d < kSiftDescriptorDim; ++d) wide[d] = a[d];
+  for (size_t k = 0; k < num_rows; ++k) {
+    const uint8_t* b = all + static_cast<int64_t>(rows[k]) * kSiftDescriptorDim;
+    int32_t dot = 0;
+    for (int d = 0; d < kSiftDescriptorDim; ++d) dot += wide[d] * static_cast<int16_t>(b[d]);
+    dots[k] = dot;
+  }
+}
+
 CAIRN_WIDE_CLONES int32_t CentredDot(const uint8_t* a, const uint8_t* b, int num_values, int offset) {
   int32_t dot = 0;
   for (int d = 0; d < num_values; ++d)
@@ -30,6 +42,13 @@ CAIRN_WIDE_CLONES int32_t CentredDot(const uint8_t* a, const uint8_t* b, int num
 int32_t DescriptorDot(const uint8_t* a, const uint8_t* b, const DescriptorSpace& space) {
   if (space.is_sift()) return SiftDot(a, b);
   return CentredDot(a, b, space.num_values, space.offset);
+}
+
+void DescriptorDots(const uint8_t* a, const DescriptorMatrix& descriptors, std::span<const int32_t> rows,
+                    const DescriptorSpace& space, int32_t* dots) {
+  if (space.is_sift()) return SiftDots(a, descriptors.data(), rows.data(), rows.size(), dots);
+  for (size_t k = 0; k < rows.size(); ++k)
+    dots[k] = CentredDot(a, descriptors.row(rows[k]).data(), space.num_values, space.offset);
 }
 
 double DescriptorAngleRad(int32_t dot, const DescriptorSpace& space) {
@@ -57,6 +76,12 @@ double DotAtAngle(double angle_rad, const DescriptorSpace& space) {
       return space.squared_norm * std::cos(kUnlikeDenseRad * std::sqrt(std::sqrt(angle_rad / kRightAngle)));
   }
   return 0;
+}
+
+int32_t LeastDotWithin(double angle_rad, const DescriptorSpace& space) {
+  if (!(angle_rad < kRightAngle)) return 0;
+  // A dot product less than what rounding may have it.
+  return std::max(0, static_cast<int32_t>(std::floor(DotAtAngle(angle_rad, space))) - 1);
 }
 
 DescriptorRow MeanDescriptor(const Eigen::Matrix<double, 1, Eigen::Dynamic>& sum, int64_t num,

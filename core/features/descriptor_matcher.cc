@@ -183,8 +183,10 @@ PooledVector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
                                      const DescriptorMatcherOptions& options) {
   PooledVector<BestTwo> rows, columns;
   FindBestTwo(descriptors1, descriptors2, &rows, &columns);
+  const DescriptorSpace& space = descriptors1.space();
+  const int32_t least_dot = LeastDotWithin(options.max_angle_rad, space);
   const auto passes = [&](const BestTwo& b) {
-    const DescriptorSpace& space = descriptors1.space();
+    if (b.best < least_dot) return false;
     const double best = DescriptorAngleRad(b.best, space);
     return best <= options.max_angle_rad &&
            (b.second < 0 || best < options.max_ratio * DescriptorAngleRad(b.second, space));

@@ -1,35 +1,42 @@
 #include "stages/match_features/guided_match.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <numeric>
+#include <span>
+#include <utility>
 
 #include <Eigen/Dense>
 
 #include "core/base/pooled.h"
 #include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
+#include "core/features/wide_clones.h"
 #include "core/geometry/pose.h"
-#include "core/geometry/two_view_error.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn::match_features {
 namespace {
 
 // The two best candidates seen so far; of equal dot products the smaller index wins, in any order.
-struct BestTwoCandidates {
-  int32_t idx = -1, best = -1, second = -1;
-
-  void Offer(int32_t dot, int32_t candidate) {
-    if (dot > best || (dot == best && candidate < idx)) {
-      second = best;
-      best = dot;
-      idx = candidate;
-    } else {
-      second = std::max(second, dot);
-    }
+class BestTwoCandidates {
+ public:
+  void Offer(int32_t dot, int32_t idx) {
+    const int64_t key = int64_t{dot} * (int64_t{1} << 32) | static_cast<uint32_t>(~idx);
+    second_ = std::max(second_, std::min(best_, key));
+    best_ = std::max(best_, key);
   }
+
+  bool IsEmpty() const { return best_ < 0; }
+  int32_t idx() const { return ~static_cast<int32_t>(best_); }
+  // Dot products; below 0: there is none.
+  int32_t best() const { return static_cast<int32_t>(best_ >> 32); }
+  int32_t second() const { return static_cast<int32_t>(second_ >> 32); }
+
+ private:
+  int64_t best_ = -1, second_ = -1;  // dot products, then indices turned around
 };
 
 // How keypoints change from the first image to the second, from the inliers.
@@ -74,14 +81,6 @@ class KeypointChange {
   double log_ratio_ = 0, turn_ = 0;
 };
 
-bool Passes(const BestTwoCandidates& candidates, const DescriptorSpace& space,
-            const GuidedMatchOptions& options) {
-  if (candidates.idx < 0) return false;
-  const double best = DescriptorAngleRad(candidates.best, space);
-  return best <= options.max_angle_rad &&
-         (candidates.second < 0 || best <= options.max_ratio * DescriptorAngleRad(candidates.second, space));
-}
-
 // Best two of every keypoint of both images over the pairs that are offered, and the matches that follow.
 class CandidateMatcher {
  public:
@@ -90,6 +89,7 @@ class CandidateMatcher {
       : options_(options),
         change_(view1, view2, inliers, options),
         space_(view1.space),
+        least_dot_(LeastDotWithin(options.max_angle_rad, space_)),
         descriptors1_(*view1.descriptors),
         descriptors2_(*view2.descriptors),
         is_matched1_(view1.bearings->size(), 0),
@@ -100,83 +100,182 @@ class CandidateMatcher {
     for (const Match& match : inliers) is_matched1_[match.idx1] = is_matched2_[match.idx2] = 1;
   }
 
+  bool IsMatched1(int idx1) const { return is_matched1_[idx1] != 0; }
+  bool IsMatched2(int idx2) const { return is_matched2_[idx2] != 0; }
   // A pair whose keypoints are both matched is not needed: neither can be part of a new match.
   bool IsNeeded(int idx1, int idx2) const { return !(is_matched1_[idx1] && is_matched2_[idx2]); }
 
-  void Offer(int idx1, int idx2) {
-    const int32_t dot = DescriptorDot(descriptors1_.row(idx1).data(), descriptors2_.row(idx2).data(), space_);
-    best1_[idx1].Offer(dot, idx2);
-    best2_[idx2].Offer(dot, idx1);
+  // Of the first image's keypoint with keypoints of the second one.
+  void Offer(int idx1, std::span<const int32_t> all_idx2) {
+    dots_.resize(std::max(dots_.size(), all_idx2.size()));
+    DescriptorDots(descriptors1_.row(idx1).data(), descriptors2_, all_idx2, space_, dots_.data());
+    for (size_t k = 0; k < all_idx2.size(); ++k) {
+      best1_[idx1].Offer(dots_[k], all_idx2[k]);
+      best2_[all_idx2[k]].Offer(dots_[k], idx1);
+    }
   }
 
   std::vector<Match> Matches() && {
     for (uint32_t idx1 = 0; idx1 < best1_.size(); ++idx1) {
-      if (is_matched1_[idx1] || !Passes(best1_[idx1], space_, options_)) continue;
-      const uint32_t idx2 = best1_[idx1].idx;
-      if (is_matched2_[idx2] || best2_[idx2].idx != static_cast<int32_t>(idx1)) continue;
-      if (Passes(best2_[idx2], space_, options_) && change_.Explains({idx1, idx2}))
-        matches_.push_back({idx1, idx2});
+      if (is_matched1_[idx1] || !Passes(best1_[idx1])) continue;
+      const uint32_t idx2 = best1_[idx1].idx();
+      if (is_matched2_[idx2] || best2_[idx2].idx() != static_cast<int32_t>(idx1)) continue;
+      if (Passes(best2_[idx2]) && change_.Explains({idx1, idx2})) matches_.push_back({idx1, idx2});
     }
     std::sort(matches_.begin(), matches_.end());
     return std::move(matches_);
   }
 
  private:
+  bool Passes(const BestTwoCandidates& candidates) const {
+    if (candidates.IsEmpty() || candidates.best() < least_dot_) return false;
+    const double best = DescriptorAngleRad(candidates.best(), space_);
+    return best <= options_.max_angle_rad &&
+           (candidates.second() < 0 ||
+            best <= options_.max_ratio * DescriptorAngleRad(candidates.second(), space_));
+  }
+
   const GuidedMatchOptions& options_;
   const KeypointChange change_;
   const DescriptorSpace space_;
+  const int32_t least_dot_;
   const DescriptorMatrix& descriptors1_;
   const DescriptorMatrix& descriptors2_;
   std::vector<uint8_t> is_matched1_, is_matched2_;
   std::vector<BestTwoCandidates> best1_, best2_;
+  std::vector<int32_t> dots_;
   std::vector<Match> matches_;
 };
 
-// A keypoint of the second image with what it is sorted by: the angle of its epipolar plane, or its height.
+// Keypoints of the second image by classes of their distance to the epipole, and by the angle of their
+// epipolar plane about the baseline.
+class EpipolarPencil {
+ public:
+  // Class k: sine of the angle to the epipole in (2^-(k+1), 2^-k], the last: below.
+  static constexpr int kNumClasses = 6;
+  static constexpr double LeastSine(int c) { return c == kNumClasses - 1 ? 0 : 0.5 / (1 << c); }
+  bool IsEmpty(int c) const { return begin_[c * kNumBins] == begin_[(c + 1) * kNumBins]; }
+
+  // An epipolar line of the second image: the normal of its plane, and what a keypoint may be off it.
+  struct Line {
+    Eigen::Vector3d normal;
+    double squared_norm = 0, max_squared_error = 0;
+  };
+
+  EpipolarPencil(const std::vector<Eigen::Vector3d>& bearings2, const Eigen::Matrix3d& M,
+                 const Eigen::Vector3d& epipole2, const CandidateMatcher& matcher)
+      : basis_(TangentBasis(epipole2)), begin_(kNumClasses * kNumBins + 1, 0) {
+    std::vector<int> bins(bearings2.size(), -1);
+    for (size_t j = 0; j < bearings2.size(); ++j) {
+      if (!bearings2[j].allFinite()) continue;
+      const Eigen::Vector3d normal = epipole2.cross(bearings2[j]);
+      const double sine = normal.norm();
+      int c = 0;
+      while (c < kNumClasses - 1 && sine <= LeastSine(c)) ++c;
+      bins[j] = c * kNumBins + BinOf(AngleOf(normal));
+      ++begin_[bins[j] + 1];
+    }
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    for (PooledVector<double>* values : {&x_, &y_, &z_, &squared_norm1_}) values->resize(begin_.back());
+    idx_.resize(begin_.back());
+    is_matched_.resize(begin_.back());
+    std::vector<int> next(begin_.begin(), begin_.end() - 1);
+    for (size_t j = 0; j < bearings2.size(); ++j) {
+      if (bins[j] < 0) continue;
+      const int k = next[bins[j]]++;
+      const Eigen::Vector3d& bearing = bearings2[j];
+      x_[k] = bearing.x(), y_[k] = bearing.y(), z_[k] = bearing.z();
+      squared_norm1_[k] = (M.transpose() * bearing).squaredNorm();
+      idx_[k] = static_cast<int32_t>(j);
+      is_matched_[k] = matcher.IsMatched2(static_cast<int>(j)) ? 1 : 0;
+    }
+  }
+
+  // Of a plane's normal, in [-pi, pi].
+  double AngleOf(const Eigen::Vector3d& normal) const {
+    return std::atan2(normal.dot(basis_.col(1)), normal.dot(basis_.col(0)));
+  }
+
+  // Adds the keypoints of a class near the line, whose angle is within `width` of its plane's, both ways
+  // around; only those without a match, or all.
+  void AddNear(int c, double angle, double width, const Line& line, bool only_unmatched,
+               std::vector<int32_t>* near) const {
+    const int first_bin = c * kNumBins;
+    if (width >= kHalfTurn) return AddRange(first_bin, first_bin + kNumBins, line, only_unmatched, near);
+    const double low = angle - width, high = angle + width;
+    AddRange(first_bin + BinOf(low), first_bin + BinOf(high) + 1, line, only_unmatched, near);
+    if (low < -kHalfTurn)
+      AddRange(first_bin + BinOf(low + 2 * kHalfTurn), first_bin + kNumBins, line, only_unmatched, near);
+    if (high > kHalfTurn)
+      AddRange(first_bin, first_bin + BinOf(high - 2 * kHalfTurn) + 1, line, only_unmatched, near);
+  }
+
+ private:
+  static constexpr double kHalfTurn = std::numbers::pi;
+  static constexpr int kNumBins = 1024;
+
+  // The first or last one for an angle beyond half a turn.
+  static int BinOf(double angle) {
+    return std::clamp(static_cast<int>((angle + kHalfTurn) * (kNumBins / (2 * kHalfTurn))), 0, kNumBins - 1);
+  }
+
+  void AddRange(int first_bin, int end_bin, const Line& line, bool only_unmatched,
+                std::vector<int32_t>* near) const {
+    const int begin = begin_[first_bin], num = begin_[end_bin] - begin;
+    if (num <= 0) return;
+    const size_t before = near->size();
+    near->resize(before + num);
+    const int num_near =
+        SelectNear(&x_[begin], &y_[begin], &z_[begin], &squared_norm1_[begin], &idx_[begin],
+                   only_unmatched ? &is_matched_[begin] : nullptr, num, line, near->data() + before);
+    near->resize(before + num_near);
+  }
+
+  // The Sampson error in tangent planes (core/geometry/two_view_error.h) of `num` keypoints, several at once.
+  CAIRN_WIDE_CLONES static int SelectNear(const double* x, const double* y, const double* z,
+                                          const double* squared_norm1, const int32_t* idx,
+                                          const uint8_t* is_matched, int num, const Line& line,
+                                          int32_t* near) {
+    constexpr int kAtOnce = 16;
+    const double nx = line.normal.x(), ny = line.normal.y(), nz = line.normal.z();
+    const double squared_norm2 = line.squared_norm, max_squared_error = line.max_squared_error;
+    int num_near = 0;
+    for (int begin = 0; begin < num; begin += kAtOnce) {
+      const int end = std::min(kAtOnce, num - begin);
+      double beyond[kAtOnce];
+      for (int k = 0; k < end; ++k) {
+        const double residual = x[begin + k] * nx + (y[begin + k] * ny + z[begin + k] * nz);
+        const double squared_residual = residual * residual;
+        const double gradient2 = squared_norm1[begin + k] + squared_norm2 - 2 * squared_residual;
+        beyond[k] = squared_residual - max_squared_error * gradient2;
+      }
+      for (int k = 0; k < end; ++k) {
+        near[num_near] = idx[begin + k];
+        const bool is_taken = is_matched != nullptr && is_matched[begin + k] != 0;
+        num_near += beyond[k] <= 0 && !is_taken ? 1 : 0;
+      }
+    }
+    return num_near;
+  }
+
+  Eigen::Matrix<double, 3, 2> basis_;
+  std::vector<int> begin_;  // per class and bin, and the end
+  // By class, bin and index; squared_norm1_: of the plane's normal in the first image.
+  PooledVector<double> x_, y_, z_, squared_norm1_;
+  PooledVector<int32_t> idx_;
+  PooledVector<uint8_t> is_matched_;
+};
+
+// A keypoint of the second image with what it is sorted by: its height.
 struct SortedKeypoint {
   double key = 0;
   int idx = 0;
   friend auto operator<=>(const SortedKeypoint&, const SortedKeypoint&) = default;
 };
-constexpr int kNumClasses =
-    6;  // class k: sine of the angle to the epipole in (2^-(k+1), 2^-k], the last: below
-using Pencil = std::array<std::vector<SortedKeypoint>, kNumClasses>;
 
-double LeastSine(int c) { return c == kNumClasses - 1 ? 0 : std::ldexp(1.0, -(c + 1)); }
-
-Pencil SortByPlane(const std::vector<Eigen::Vector3d>& bearings2, const Eigen::Vector3d& epipole2,
-                   const Eigen::Matrix<double, 3, 2>& basis) {
-  Pencil pencil;
-  for (int idx = 0; idx < static_cast<int>(bearings2.size()); ++idx) {
-    if (!bearings2[idx].allFinite()) continue;
-    const Eigen::Vector3d normal = epipole2.cross(bearings2[idx]);
-    const double sine = normal.norm();
-    int c = 0;
-    while (c < kNumClasses - 1 && sine <= LeastSine(c)) ++c;
-    pencil[c].push_back({std::atan2(normal.dot(basis.col(1)), normal.dot(basis.col(0))), idx});
-  }
-  for (std::vector<SortedKeypoint>& entries : pencil) {
-    std::sort(entries.begin(), entries.end());
-  }
-  return pencil;
-}
-
-// Calls visit(idx) for the entries within `width` of `angle`, both ways around.
-template <typename Visit>
-void VisitWindow(const std::vector<SortedKeypoint>& entries, double angle, double width, Visit visit) {
-  constexpr double kTurn = 2 * std::numbers::pi;
-  if (width >= std::numbers::pi) {
-    for (const SortedKeypoint& entry : entries) visit(entry.idx);
-    return;
-  }
-  for (const double shift : {-kTurn, 0.0, kTurn}) {
-    const double low = angle + shift - width, high = angle + shift + width;
-    if (high < -std::numbers::pi || low > std::numbers::pi) continue;
-    auto entry = std::lower_bound(entries.begin(), entries.end(), low,
-                                  [](const SortedKeypoint& e, double value) { return e.key < value; });
-    for (; entry != entries.end() && entry->key <= high; ++entry) visit(entry->idx);
-  }
-}
+// At least the angle of a sine in [0, 1]: the arc sine is x + sum_k c_k x^(2k + 1) with c_k > 0 that sum up
+// to pi / 2 - 1.
+double AngleBound(double sine) { return sine + (std::numbers::pi / 2 - 1) * sine * sine * sine; }
 
 }  // namespace
 
@@ -194,36 +293,27 @@ std::vector<Match> GuideByEpipolarLines(const GuidedView& view1, const GuidedVie
     sign += epipole2.cross(bearings2[match.idx2]).dot(M * bearings1[match.idx1]) > 0 ? 1 : -1;
   }
   if (sign < 0) epipole2 = -epipole2;
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(epipole2);
-  const Pencil pencil = SortByPlane(bearings2, epipole2, basis);
-  std::vector<double> squared_norm1(bearings2.size());  // of the plane's normal in the first image
-  for (size_t j = 0; j < bearings2.size(); ++j)
-    squared_norm1[j] = (M.transpose() * bearings2[j]).squaredNorm();
-
   CandidateMatcher matcher(view1, view2, inliers, options);
-  const double max_error2 = max_error_rad * max_error_rad;
+  const EpipolarPencil pencil(bearings2, M, epipole2, matcher);
+  std::vector<int32_t> near;
   for (int i = 0; i < static_cast<int>(bearings1.size()); ++i) {
     const Eigen::Vector3d normal = M * bearings1[i];
-    const double squared_norm2 = normal.squaredNorm();
-    if (!(squared_norm2 > 0)) continue;  // the epipole itself, or NaN
-    const double angle = std::atan2(normal.dot(basis.col(1)), normal.dot(basis.col(0)));
-    const auto visit = [&](int j) {
-      if (!matcher.IsNeeded(i, j)) return;
-      const double residual = bearings2[j].dot(normal);
-      const double squared_residual = residual * residual;
-      const double gradient2 = squared_norm1[j] + squared_norm2 - 2 * squared_residual;
-      if (squared_residual <= max_error2 * gradient2) matcher.Offer(i, j);
-    };
-    for (int c = 0; c < kNumClasses; ++c) {
+    const EpipolarPencil::Line line{normal, normal.squaredNorm(), max_error_rad * max_error_rad};
+    if (!(line.squared_norm > 0)) continue;  // the epipole itself, or NaN
+    const double angle = pencil.AngleOf(normal);
+    near.clear();
+    for (int c = 0; c < EpipolarPencil::kNumClasses; ++c) {
+      if (pencil.IsEmpty(c)) continue;
       // residual = |normal| sin(angle to the epipole) sin(angle between the planes), and the gradient is at
       // most |normal|^2 + (largest sin(angle to the epipole))^2: beyond this width nothing passes the test.
-      const double least_sine = LeastSine(c);
-      const double sine =
-          least_sine > 0
-              ? max_error_rad * std::sqrt(1 / (least_sine * least_sine) + largest * largest / squared_norm2)
-              : 1;
-      VisitWindow(pencil[c], angle, sine < 1 ? std::asin(sine) : std::numbers::pi, visit);
+      const double least_sine = EpipolarPencil::LeastSine(c);
+      const double sine = least_sine > 0 ? max_error_rad * std::sqrt(1 / (least_sine * least_sine) +
+                                                                     largest * largest / line.squared_norm)
+                                         : 1;
+      pencil.AddNear(c, angle, sine < 1 ? AngleBound(sine) : std::numbers::pi, line, matcher.IsMatched1(i),
+                     &near);
     }
+    matcher.Offer(i, near);
   }
   return std::move(matcher).Matches();
 }
@@ -238,17 +328,19 @@ std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& 
   }
   std::sort(by_height.begin(), by_height.end());
   CandidateMatcher matcher(view1, view2, inliers, options);
+  std::vector<int32_t> near;
   for (int i = 0; i < static_cast<int>(bearings1.size()); ++i) {
     const Eigen::Vector3d predicted = (H * bearings1[i]).normalized();
     if (!predicted.allFinite()) continue;
     auto entry = std::lower_bound(by_height.begin(), by_height.end(), predicted.y() - max_error_rad,
                                   [](const SortedKeypoint& e, double value) { return e.key < value; });
+    near.clear();
     for (; entry != by_height.end() && entry->key <= predicted.y() + max_error_rad; ++entry) {
       if (matcher.IsNeeded(i, entry->idx) &&
-          (predicted - bearings2[entry->idx]).squaredNorm() <= max_error_rad * max_error_rad) {
-        matcher.Offer(i, entry->idx);
-      }
+          (predicted - bearings2[entry->idx]).squaredNorm() <= max_error_rad * max_error_rad)
+        near.push_back(entry->idx);
     }
+    matcher.Offer(i, near);
   }
   return std::move(matcher).Matches();
 }
