@@ -42,7 +42,8 @@ void WarnIfDisconnected(const World& world) {
 Result<Decomposition> Decompose(const World& world, const Arguments& arguments,
                                 const CommandEnvironment& environment) {
   const DecomposeRegionsOptions& options = arguments.options;
-  Result<Decomposition> result = DecomposeRegions(world, options, environment.seed, *environment.progress);
+  Result<Decomposition> result =
+      DecomposeRegions(world, options, environment.seed, environment.num_threads, *environment.progress);
   if (result.ok()) return result;
   if (result.error().code != ErrorCode::kNoData || world.num_stations() == 0 ||
       !CoverableStations(world, options.k, options.tau).empty()) {

@@ -134,6 +134,12 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .value = &o->best_num_repairs,
        .help = "algorithm best: number of neighbourhoods that are covered again; time grows with it",
        .min = 0},
+      {.name = "best_window_stations",
+       .value = &o->best_window_stations,
+       .help =
+           "algorithm best: least number of stations that are covered at once; a larger part of a world is "
+           "covered window by window",
+       .min = 1},
       {.name = "best_max_stations",
        .value = &o->best_max_stations,
        .help = "largest world for column generation; beyond it, best is b2 and the bound is counted",
@@ -142,18 +148,19 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
   const OptionTable choose_features = DescribeOptions(&o->choose_features);
   table.insert(table.end(), choose_features.begin(), choose_features.end());
   AddCondition({"algorithm", {"c"}}, {"alpha"}, &table);
-  AddCondition({"algorithm", {"best"}}, {"best_exchanges_per_station", "best_num_repairs"}, &table);
+  AddCondition({"algorithm", {"best"}},
+               {"best_exchanges_per_station", "best_num_repairs", "best_window_stations"}, &table);
   return table;
 }
 
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed) {
   NoProgress progress;
-  return DecomposeRegions(world, options, seed, progress);
+  return DecomposeRegions(world, options, seed, 1, progress);
 }
 
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
-                                       uint64_t seed, Progress& progress) {
+                                       uint64_t seed, int num_threads, Progress& progress) {
   DecomposeRegionsOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (world.num_stations() == 0) return MakeError(ErrorCode::kNoData, "the world has no station");
@@ -190,13 +197,15 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
   if (options.algorithm == "best" && is_small) {
     decomposition = AlgorithmBest(world, decomposition,
                                   {.exchanges_per_station = options.best_exchanges_per_station,
-                                   .num_repairs = options.best_num_repairs},
+                                   .num_repairs = options.best_num_repairs,
+                                   .window_stations = options.best_window_stations,
+                                   .num_threads = num_threads},
                                   seed, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
     if (options.lower_bound == "counted")
       decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   } else if (options.lower_bound == "certified" && is_small) {
-    decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
+    decomposition.lower_bound = CertifiedLowerBound(world, decomposition, num_threads);
   } else if (options.lower_bound != "none") {
     decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   }

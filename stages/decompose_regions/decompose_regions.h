@@ -54,9 +54,12 @@ struct DecomposeRegionsOptions {
   int best_exchanges_per_station = 400;
   // Algorithm best: number of neighbourhoods that are covered again (cover_search.h).  REQUIRES: >= 0
   int best_num_repairs = 60;
-  // Column generation takes seconds for some thousand stations and memory for a few thousand regions: worlds
-  // larger than this get the regions of B.2 instead of best's, and the counted bound.  REQUIRES: >= 0
-  int best_max_stations = 20000;
+  // Algorithm best: coverable stations that are covered at once, at least; larger parts of a world are
+  // covered window by window (algorithm_best.h).  REQUIRES: >= 1
+  int best_window_stations = 1500;
+  // Column generation takes two minutes for 60,000 stations: worlds larger than this get the regions of B.2
+  // instead of best's, and the counted bound.  REQUIRES: >= 0
+  int best_max_stations = 200000;
   // Which features regions keep: used by ChooseFeatures after the regions are made, where the classes
   // are known.
   ChooseFeaturesOptions choose_features;
@@ -67,8 +70,9 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 // for each region, O(k) passes over the incidences of the region's stations; memory is proportional to the
 // incidences.  REQUIRES: CheckWorld(world) is ok.  Errors: InvalidArgument for a bad option, NoData when no
 // station is coverable (says which k the best station allows) or no region covers more than rho, Cancelled.
+// `num_threads` changes nothing.
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
-                                       uint64_t seed, Progress& progress);
+                                       uint64_t seed, int num_threads, Progress& progress);
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed);
 

@@ -133,13 +133,13 @@ TEST(DecomposeRegions, ReportsEveryCoverableStationOnceAndStopsWhenCancelled) {
   for (const char* algorithm : kAlgorithms) {
     const DecomposeRegionsOptions options{.algorithm = algorithm, .k = 2, .tau = 0, .rho = 0};
     CancelAfter never(1000000);
-    ASSERT_TRUE(DecomposeRegions(world, options, 0, never).ok());
+    ASSERT_TRUE(DecomposeRegions(world, options, 0, 2, never).ok());
     EXPECT_EQ(never.done_, never.total_) << algorithm;
     EXPECT_EQ(never.num_tasks_, algorithm == std::string("best") ? 2 : 1);
     EXPECT_LE(never.done_later_, never.total_later_);  // repairs end where the lower bound is reached
     EXPECT_EQ(never.total_, static_cast<int64_t>(CoverableStations(world, 2, 0).size()));
     CancelAfter soon(1);
-    const Result<Decomposition> result = DecomposeRegions(world, options, 0, soon);
+    const Result<Decomposition> result = DecomposeRegions(world, options, 0, 2, soon);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
     EXPECT_LT(soon.done_, soon.total_) << algorithm;

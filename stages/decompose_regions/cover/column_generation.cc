@@ -20,8 +20,10 @@ constexpr double kValueSpread = 0.2;
 // The certificate of station values, without the largest value of a region.
 struct DualValues {
   StationValues values;  // min(y_v, z), whole numbers
-  int64_t covered = 0;   // least total value of the stations that are covered
-  int64_t most = 0;      // largest value of a region of the pool
+  int64_t total = 0;     // of all stations
+  int64_t z = 0;
+  int64_t covered = 0;  // least total value of the stations that are covered
+  int64_t most = 0;     // largest value of a region of the pool
 };
 
 DualValues RoundedDual(const std::vector<double>& station_values, const RegionPool& pool, int max_uncovered) {
@@ -33,12 +35,12 @@ DualValues RoundedDual(const std::vector<double>& station_values, const RegionPo
   StationValues sorted = dual.values;
   const auto cut = sorted.begin() + std::min<size_t>(max_uncovered, sorted.size() - 1);
   std::nth_element(sorted.begin(), cut, sorted.end(), std::greater<>());
-  const int64_t z = *cut;
+  dual.z = *cut;
   for (int64_t& value : dual.values) {
-    value = std::min(value, z);
-    dual.covered += value;
+    value = std::min(value, dual.z);
+    dual.total += value;
   }
-  dual.covered -= z * max_uncovered;
+  dual.covered = dual.total - dual.z * max_uncovered;
   std::vector<int64_t> partial_sums = {0};
   for (const int64_t value : dual.values) partial_sums.push_back(partial_sums.back() + value);
   for (int region = 0; region < pool.size(); ++region) {
@@ -54,7 +56,38 @@ int CeilRatio(int64_t numerator, int64_t denominator) {
                                             : static_cast<int>((numerator + denominator - 1) / denominator);
 }
 
+using Wide = __int128;
+
+// What a certificate proves, before it is rounded up, as a fraction.
+struct Proven {
+  Wide regions = 0, unit = 1;
+  Proven(const Certificate& certificate, int max_uncovered) {
+    if (certificate.most_of_region <= 0) return;
+    regions = Wide{certificate.total} - Wide{certificate.most_of_station} * max_uncovered;
+    unit = certificate.most_of_region;
+  }
+  friend bool operator<(const Proven& a, const Proven& b) { return a.regions * b.unit < b.regions * a.unit; }
+};
+
 }  // namespace
+
+int LeastNumberOfRegions(const std::vector<Certificate>& parts, int max_uncovered) {
+  // Parts of a region, for sums over parts: rounded down, and what is subtracted up.
+  constexpr Wide kUnit = Wide{1} << 32;
+  Wide least = 0, most_of_station = 0;
+  for (const Certificate& part : parts) {
+    if (part.most_of_region <= 0) continue;
+    if (max_uncovered == 0) {
+      least += kUnit * CeilRatio(part.total, part.most_of_region);
+    } else {
+      least += kUnit * part.total / part.most_of_region;
+      most_of_station = std::max(
+          most_of_station, (kUnit * part.most_of_station + part.most_of_region - 1) / part.most_of_region);
+    }
+  }
+  least -= most_of_station * max_uncovered;
+  return least <= 0 ? 0 : static_cast<int>((least + kUnit - 1) / kUnit);
+}
 
 ColumnGeneration::ColumnGeneration(const ReducedWorld& wide, int max_uncovered,
                                    const ColumnGenerationOptions& options)
@@ -128,6 +161,8 @@ void ColumnGeneration::RunExactRounds() {
         exact_pricer_.MaxValue(dual.values, dual.most + dual.most / kExactMargin, max_work, &found);
     total_work += exact_pricer_.work();
     lower_bound_ = std::max(lower_bound_, CeilRatio(dual.covered, max_value));
+    const Certificate now = {dual.total, dual.z, max_value};
+    if (Proven(certificate_, max_uncovered_) < Proven(now, max_uncovered_)) certificate_ = now;
     // Regions that join the pool only lower its optimum.
     const bool is_tight = CeilRatio(dual.covered, dual.most) <= lower_bound_;
     if (AddMostValuable(dual.values, std::move(found)) == 0 || is_tight) break;

@@ -24,6 +24,20 @@ struct ColumnGenerationOptions {
   int64_t max_work_ratio = 2000, max_total_work_ratio = 10000;
 };
 
+// Whole numbers y_v >= 0 of the stations of a world, or of a part of one between which and the rest no region
+// passes, that prove how many regions are needed (ColumnGeneration).
+struct Certificate {
+  int64_t total = 0;            // sum of y_v
+  int64_t most_of_station = 0;  // z: the largest y_v
+  int64_t most_of_region = 0;   // M: at least what any region's core is worth; 0: nothing is proven
+};
+
+// The least number of regions of all parts together that leave at most H coverable stations uncovered,
+// anywhere.  Each part's values are divided by its M:
+//   |D|  >=  sum over parts of total / M  -  H max over parts of z / M
+// rounded up; where H is 0, each part's share is rounded up.
+int LeastNumberOfRegions(const std::vector<Certificate>& parts, int max_uncovered);
+
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
 // the world: repeatedly solves it over a pool of regions and adds regions of value above 1 [Gilmore and
 // Gomory 1961].
@@ -52,6 +66,8 @@ class ColumnGeneration {
   void LowerMaxUncovered(int max_uncovered);
   // Certified least number of regions; 0 before Run.
   int lower_bound() const { return lower_bound_; }
+  // That of the greatest bound before it is rounded up.
+  const Certificate& certificate() const { return certificate_; }
   // Adds regions to the pool that are worthwhile by the values of another program over it; returns how many.
   int Price(const CoverLp& lp);
   // Adds regions to the pool that the relaxation barely leaves out.
@@ -70,6 +86,7 @@ class ColumnGeneration {
   ExactPricer exact_pricer_;
   CoverLp lp_;
   int lower_bound_ = 0;
+  Certificate certificate_;
 };
 
 }  // namespace cairn::decompose_regions

@@ -36,6 +36,7 @@ ExactPricer::ExactPricer(const ReducedWorld& wide)
       finder_(wide),
       components_(wide.neighbours),
       num_shared_(wide.num_stations(), 0),
+      num_seen_(wide.num_stations(), 0),
       local_(wide.areas.size(), -1) {}
 
 int64_t ExactPricer::MaxValue(const StationValues& values, int64_t threshold, int64_t max_work,
@@ -290,18 +291,22 @@ void ExactPricer::Divide(const std::vector<int32_t>& features, size_t num_fixed)
 // The value of the stations that see all features and lie in the anchor's component of the stations whose
 // surroundings see the fixed ones and k in all.
 int64_t ExactPricer::ReachableValue(const std::vector<int32_t>& features, size_t num_fixed) {
-  std::vector<int> counts(wide_.num_stations(), 0);
   const auto k = static_cast<int>(wide_.k), num_others = static_cast<int>(features.size());
+  std::vector<StationIdx> seen;
   for (size_t i = 0; i < features.size(); ++i) {
-    for (const StationIdx station : wide_.whole_areas[features[i]])
-      counts[station] += i < num_fixed ? num_others : 1;
+    for (const StationIdx station : wide_.whole_areas[features[i]]) {
+      if (num_seen_[station] == 0) seen.push_back(station);
+      num_seen_[station] += i < num_fixed ? num_others : 1;
+    }
     Spend(static_cast<int64_t>(wide_.whole_areas[features[i]].size()));
   }
   const int fixed = static_cast<int>(num_fixed);
   std::vector<StationIdx> passable;
-  for (StationIdx station = 0; station < wide_.num_stations(); ++station) {
-    if (counts[station] >= fixed * num_others + (k - fixed)) passable.push_back(station);
+  for (const StationIdx station : seen) {
+    if (num_seen_[station] >= fixed * num_others + (k - fixed)) passable.push_back(station);
+    num_seen_[station] = 0;
   }
+  std::sort(passable.begin(), passable.end());
   const std::vector<StationIdx> seeing = CommonStations(wide_.areas, features);
   int64_t value = 0;
   for (const std::vector<StationIdx>& component : components_.Components(passable)) {

@@ -81,7 +81,7 @@ class ExactPricer {
   Bits missing_;  // per station, num_words_ words: the anchor's features that it does not see
   size_t num_words_ = 0;
   // Scratch.
-  std::vector<int32_t> num_shared_;  // per station, zero between uses
+  std::vector<int32_t> num_shared_, num_seen_;  // per station, zero between uses
   std::vector<StationIdx> sharing_;
   std::vector<int32_t> local_;            // per feature, -1 between uses
   std::vector<int64_t> losses_, shares_;  // per feature of the anchor

@@ -1,0 +1,140 @@
+#include "stages/decompose_regions/cover/world_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace cairn::decompose_regions {
+namespace {
+
+// A window is divided at a part of its stations between this and one minus this.
+constexpr double kLeastShare = 0.38;
+
+// Whether two ascending lists have `num` values in common.
+bool HaveInCommon(std::span<const int32_t> a, std::span<const int32_t> b, int num) {
+  for (size_t i = 0, j = 0; i < a.size() && j < b.size() && num > 0;) {
+    if (a[i] == b[j]) {
+      ++i, ++j, --num;
+    } else {
+      ++(a[i] < b[j] ? i : j);
+    }
+  }
+  return num <= 0;
+}
+
+// Of ascending values: where each of `all` that is in `some` stands there.
+template <typename Values>
+std::vector<int32_t> PlacesOf(const Values& all, std::span<const int32_t> some) {
+  std::vector<int32_t> places;
+  for (const int32_t value : some) {
+    const auto found = std::lower_bound(all.begin(), all.end(), value);
+    if (found != all.end() && *found == value) places.push_back(static_cast<int32_t>(found - all.begin()));
+  }
+  return places;
+}
+
+void Divide(const std::vector<Eigen::Vector2d>& positions, std::vector<StationIdx> stations, int most,
+            Random* random, std::vector<std::vector<StationIdx>>* windows) {
+  if (static_cast<int>(stations.size()) <= most) {
+    std::sort(stations.begin(), stations.end());
+    windows->push_back(std::move(stations));
+    return;
+  }
+  Eigen::Array2d low = positions[stations[0]], high = low;
+  for (const StationIdx station : stations) {
+    low = low.min(positions[station].array());
+    high = high.max(positions[station].array());
+  }
+  const int axis = (high - low).x() >= (high - low).y() ? 0 : 1;
+  const double share = random->Uniform(kLeastShare, 1 - kLeastShare);
+  const auto middle =
+      stations.begin() + std::clamp<ptrdiff_t>(std::lround(share * static_cast<double>(stations.size())), 1,
+                                               std::ssize(stations) - 1);
+  std::nth_element(stations.begin(), middle, stations.end(), [&](StationIdx a, StationIdx b) {
+    return std::pair(positions[a][axis], a) < std::pair(positions[b][axis], b);
+  });
+  Divide(positions, {stations.begin(), middle}, most, random, windows);
+  Divide(positions, {middle, stations.end()}, most, random, windows);
+}
+
+}  // namespace
+
+std::vector<std::vector<StationIdx>> IndependentParts(const ReducedWorld& wide) {
+  const IndexLists seen = wide.whole_areas.Transposed(wide.num_stations());
+  std::vector<std::vector<StationIdx>> parts;
+  std::vector<char> is_visited(wide.num_stations(), 0);
+  for (StationIdx first = 0; first < wide.num_stations(); ++first) {
+    if (is_visited[first]) continue;
+    is_visited[first] = 1;
+    std::vector<StationIdx> part = {first};
+    for (size_t i = 0; i < part.size(); ++i) {
+      for (const StationIdx next : wide.neighbours[part[i]]) {
+        if (is_visited[next] || !HaveInCommon(seen[part[i]], seen[next], wide.k)) continue;
+        is_visited[next] = 1;
+        part.push_back(next);
+      }
+    }
+    if (std::none_of(part.begin(), part.end(), [&](StationIdx s) { return wide.coverable[s] != 0; }))
+      continue;
+    std::sort(part.begin(), part.end());
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+std::vector<std::vector<StationIdx>> FloorWindows(const std::vector<Eigen::Vector2d>& positions,
+                                                  std::vector<StationIdx> stations, int most,
+                                                  Random* random) {
+  std::vector<std::vector<StationIdx>> windows;
+  if (!stations.empty()) Divide(positions, std::move(stations), most, random, &windows);
+  return windows;
+}
+
+CoreRegion WorldPart::InWhole(const CoreRegion& core) const {
+  CoreRegion whole;
+  for (const int32_t feature : core.features) whole.features.push_back(features[feature]);
+  for (const StationIdx station : core.stations) whole.stations.push_back(stations[station]);
+  return whole;
+}
+
+CoreRegion WorldPart::InPart(const CoreRegion& core) const {
+  return {PlacesOf(features, core.features), PlacesOf(stations, core.stations)};
+}
+
+WorldPart CutOut(const ReducedWorld& wide, std::vector<StationIdx> stations,
+                 std::span<const StationIdx> open) {
+  WorldPart part;
+  part.stations = std::move(stations);
+  for (const StationIdx station : open)
+    part.features.insert(part.features.end(), wide.sets[station].begin(), wide.sets[station].end());
+  std::sort(part.features.begin(), part.features.end());
+  part.features.erase(std::unique(part.features.begin(), part.features.end()), part.features.end());
+  const auto num_stations = static_cast<int>(part.stations.size());
+  std::vector<int32_t> place(wide.num_stations(), -1);
+  for (int i = 0; i < num_stations; ++i) place[part.stations[i]] = i;
+  std::vector<int32_t> kept;
+  const auto keep = [&](std::span<const StationIdx> some, const std::vector<char>* which) {
+    kept.clear();
+    for (const StationIdx station : some) {
+      const int32_t i = place[station];
+      if (i >= 0 && (which == nullptr || (*which)[i])) kept.push_back(i);
+    }
+    return std::span<const int32_t>(kept);
+  };
+  ReducedWorld& world = part.world;
+  world.k = wide.k;
+  world.coverable.assign(num_stations, 0);
+  for (const StationIdx station : open) world.coverable[place[station]] = 1;
+  world.num_coverable = static_cast<int>(open.size());
+  for (const StationIdx station : part.stations)
+    world.neighbours.Append(keep(wide.neighbours[station], nullptr));
+  for (const int32_t feature : part.features) {
+    world.areas.Append(keep(wide.areas[feature], &world.coverable));
+    world.whole_areas.Append(keep(wide.whole_areas[feature], nullptr));
+    world.original.push_back(wide.original[feature]);
+  }
+  world.sets = world.areas.Transposed(num_stations);
+  return part;
+}
+
+}  // namespace cairn::decompose_regions
