@@ -264,8 +264,8 @@ std::string PairProblem(const TwoViewGeometry& geometry,
 
 }  // namespace
 
-Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
-                                                                   int min_num_inliers) {
+Status ForEachTwoViewGeometry(SQLite::Database& database, int min_num_inliers,
+                              const std::function<Status(TwoViewGeometry)>& visit) {
   CAIRN_ASSIGN_OR_RETURN(const auto num_keypoints, CountKeypoints(database));
   const char* const table = "two_view_geometries";
   const auto matrix_column = [&](const char* name) {
@@ -274,7 +274,6 @@ Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Datab
   SQLite::Statement query(
       database, fmt::format("SELECT pair_id, rows, cols, data, config, {}, {}, {} FROM {} ORDER BY 1",
                             matrix_column("F"), matrix_column("E"), matrix_column("H"), table));
-  std::vector<TwoViewGeometry> geometries;
   while (query.executeStep()) {
     RowReader row(query);
     TwoViewGeometry geometry;
@@ -298,8 +297,19 @@ Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Datab
     geometry.F = MatrixFromColumn(query.getColumn(5));
     geometry.E = MatrixFromColumn(query.getColumn(6));
     geometry.H = MatrixFromColumn(query.getColumn(7));
-    geometries.push_back(std::move(geometry));
+    CAIRN_RETURN_IF_ERROR(visit(std::move(geometry)));
   }
+  return Ok();
+}
+
+Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
+                                                                   int min_num_inliers) {
+  std::vector<TwoViewGeometry> geometries;
+  CAIRN_RETURN_IF_ERROR(
+      ForEachTwoViewGeometry(database, min_num_inliers, [&](TwoViewGeometry geometry) -> Status {
+        geometries.push_back(std::move(geometry));
+        return Ok();
+      }));
   return geometries;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -81,6 +82,9 @@ Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, Ima
 // All pairs with at least `min_num_inliers` inliers, ascending pair_id.
 Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
                                                                    int min_num_inliers);
+// The same one by one: a large survey's do not fit into memory.  Ends at an error of `visit`.
+Status ForEachTwoViewGeometry(SQLite::Database& database, int min_num_inliers,
+                              const std::function<Status(TwoViewGeometry)>& visit);
 
 // Writers.
 void WriteDatabaseCamera(SQLite::Database& database, const Camera& camera);

@@ -14,7 +14,7 @@ namespace cairn::group_classes {
 namespace {
 
 // Bytes of memory per byte of the input file.
-constexpr double kMemoryPerFileByte = 3;
+constexpr double kMemoryPerFileByte = 2;
 
 struct Arguments {
   std::string matches;
@@ -130,8 +130,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   SolvedFile solved(SolvedPath(arguments.output));
   const auto group_and_write = [&]() -> Result<GroupClassesResult> {
+    GroupClassesOptions options = arguments.options;
+    options.scratch_beside = arguments.output;
     CAIRN_ASSIGN_OR_RETURN(GroupClassesResult result,
-                           GroupClasses(matched, capture, arguments.options, environment.num_threads,
+                           GroupClasses(matched, capture, options, environment.num_threads,
                                         *environment.progress, &solved, sessions));
     CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
     return result;

@@ -7,14 +7,14 @@
 
 #include "core/base/parallel.h"
 #include "core/capture/sessions.h"
-#include "core/colmap/landmark_images.h"
-#include "core/features/descriptor_kind_table.h"
-#include "core/files/database.h"
 #include "core/structure/union_matches.h"
 #include "stages/group_classes/make_classes.h"
 
 namespace cairn::group_classes {
 namespace {
+
+// Of twelve bytes.
+constexpr size_t kMaxNumMatchesInMemory = size_t{1} << 24;
 
 // Per posed image and keypoint: whether its camera has a ray for it.
 std::vector<std::vector<bool>> FindRays(const MatchedFeatures& matched, const PosedImages& posed,
@@ -29,8 +29,11 @@ std::vector<std::vector<bool>> FindRays(const MatchedFeatures& matched, const Po
   return has_ray;
 }
 
-std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed, int num_threads,
-                               int64_t* num_conflicts) {
+// Also lists pairs one of whose images has no pose.
+Result<std::vector<Track>> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed,
+                                       const GroupClassesOptions& options, int num_threads,
+                                       std::vector<DroppedItem>* dropped_items, int64_t* num_conflicts) {
+  CAIRN_ASSIGN_OR_RETURN(MatchReader reader, MatchReader::Open(matched));
   std::map<ImageId, int> posed_idx;
   std::vector<int> num_keypoints;
   for (int i = 0; i < posed.num_images(); ++i) {
@@ -38,26 +41,30 @@ std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages
     num_keypoints.push_back(static_cast<int>(matched.features[posed.feature_idx[i]].keypoints.size()));
   }
   const std::vector<std::vector<bool>> has_ray = FindRays(matched, posed, num_threads);
-  size_t num_matches = 0;
-  for (const TwoViewGeometry& geometry : matched.geometries) num_matches += geometry.inliers.size();
-  ScoredMatches matches(num_keypoints);
-  matches.Reserve(num_matches);
-  for (const TwoViewGeometry& geometry : matched.geometries) {
+  ScoredMatches matches = options.scratch_beside.empty()
+                              ? ScoredMatches(num_keypoints)
+                              : ScoredMatches(num_keypoints, options.scratch_beside, kMaxNumMatchesInMemory);
+  CAIRN_RETURN_IF_ERROR(reader.ForEachPair([&](const TwoViewGeometry& geometry) -> Status {
     const auto image1 = posed_idx.find(geometry.image_id1), image2 = posed_idx.find(geometry.image_id2);
-    if (image1 == posed_idx.end() || image2 == posed_idx.end()) continue;
-    const DescriptorMatrix& descriptors1 = matched.features[posed.feature_idx[image1->second]].descriptors;
-    const DescriptorMatrix& descriptors2 = matched.features[posed.feature_idx[image2->second]].descriptors;
+    if (image1 == posed_idx.end() || image2 == posed_idx.end()) {
+      dropped_items->push_back({.reason = DropReason::kPairWithoutPose,
+                                .item_id = PairIdFromImageIds(geometry.image_id1, geometry.image_id2)});
+      return Ok();
+    }
+    CAIRN_ASSIGN_OR_RETURN(const auto descriptors1, reader.DescriptorsOf(posed.feature_idx[image1->second]));
+    CAIRN_ASSIGN_OR_RETURN(const auto descriptors2, reader.DescriptorsOf(posed.feature_idx[image2->second]));
     for (const Match& match : geometry.inliers) {
       if (!has_ray[image1->second][match.idx1] || !has_ray[image2->second][match.idx2]) continue;
       const int32_t dot =
-          descriptors1.row(match.idx1).cast<int32_t>().dot(descriptors2.row(match.idx2).cast<int32_t>());
+          descriptors1->row(match.idx1).cast<int32_t>().dot(descriptors2->row(match.idx2).cast<int32_t>());
       matches.Add({image1->second, match.idx1}, {image2->second, match.idx2}, dot);
     }
-  }
+    return Ok();
+  }));
   return UnionMatches(std::move(matches), num_conflicts);
 }
 
-// Images without a pose, and pairs that have one of them.
+// Images without a pose.
 void ListUnposed(const MatchedFeatures& matched, const PosedImages& posed,
                  std::vector<DroppedItem>* dropped_items) {
   std::set<ImageId> posed_ids;
@@ -65,11 +72,6 @@ void ListUnposed(const MatchedFeatures& matched, const PosedImages& posed,
   for (const DatabaseImage& image : matched.images) {
     if (!posed_ids.contains(image.image_id))
       dropped_items->push_back({.reason = DropReason::kNoPose, .item_id = image.image_id});
-  }
-  for (const TwoViewGeometry& geometry : matched.geometries) {
-    if (posed_ids.contains(geometry.image_id1) && posed_ids.contains(geometry.image_id2)) continue;
-    dropped_items->push_back({.reason = DropReason::kPairWithoutPose,
-                              .item_id = PairIdFromImageIds(geometry.image_id1, geometry.image_id2)});
   }
 }
 
@@ -166,52 +168,6 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
   return table;
 }
 
-Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
-  return WithDatabaseErrors(matches_path, [&]() -> Result<MatchedFeatures> {
-    MatchedFeatures matched;
-    CAIRN_ASSIGN_OR_RETURN(matched.cameras, ReadDatabaseCameras(database));
-    CAIRN_ASSIGN_OR_RETURN(matched.images, ReadDatabaseImages(database));
-    CAIRN_ASSIGN_OR_RETURN(const DescriptorKind kind, ReadDescriptorKind(database, matches_path));
-    std::map<ImageId, size_t> num_keypoints;
-    for (const DatabaseImage& image : matched.images) {
-      if (matched.cameras.count(image.camera_id) == 0) {
-        return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
-                         matches_path, image.name, image.camera_id);
-      }
-      Features features{.keypoints = {}, .descriptors = {}, .kind = kind};
-      CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
-      CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
-      if (static_cast<size_t>(features.descriptors.rows()) != features.keypoints.size()) {
-        return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
-                         matches_path, image.name, features.keypoints.size(), features.descriptors.rows());
-      }
-      num_keypoints.emplace(image.image_id, features.keypoints.size());
-      matched.features.push_back(std::move(features));
-    }
-    CAIRN_ASSIGN_OR_RETURN(matched.geometries, ReadDatabaseTwoViewGeometries(database, 1));
-    matched.landmark_images = ReadLandmarkImages(database);
-    for (const TwoViewGeometry& geometry : matched.geometries) {
-      const auto image1 = num_keypoints.find(geometry.image_id1),
-                 image2 = num_keypoints.find(geometry.image_id2);
-      if (image1 == num_keypoints.end() || image2 == num_keypoints.end()) {
-        return MakeError(ErrorCode::kCorrupt,
-                         "{}: a pair names images {} and {}, of which one is not in the database",
-                         matches_path, geometry.image_id1, geometry.image_id2);
-      }
-      for (const Match& match : geometry.inliers) {
-        if (match.idx1 >= image1->second || match.idx2 >= image2->second) {
-          return MakeError(ErrorCode::kCorrupt,
-                           "{}: pair ({}, {}) matches keypoints {} and {}, beyond the images' {} and {}",
-                           matches_path, geometry.image_id1, geometry.image_id2, match.idx1, match.idx2,
-                           image1->second, image2->second);
-        }
-      }
-    }
-    return matched;
-  });
-}
-
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress, SolvedFile* solved,
@@ -224,7 +180,10 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
                      capture.root);
   }
   GroupClassesResult result;
-  const std::vector<Track> tracks = BuildTracks(matched, posed, num_threads, &result.num_conflicts);
+  ListUnposed(matched, posed, &result.dropped_items);
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::vector<Track> tracks,
+      BuildTracks(matched, posed, options, num_threads, &result.dropped_items, &result.num_conflicts));
   result.num_tracks = static_cast<int64_t>(tracks.size());
 
   progress.Begin("triangulate tracks", 1, "rounds");
@@ -268,8 +227,8 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   }
   classes.camera_from_given = posed.camera_from_given;
   MeasurePoseNoise(&classes);
-  ListUnposed(matched, posed, &result.dropped_items);
-  MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes, &result.dropped_items);
+  CAIRN_RETURN_IF_ERROR(MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes,
+                                    &result.dropped_items));
   if (sessions.size() > 1)
     Forget(sessions, matched.landmark_images, options.persistence, num_threads, &result);
   progress.Advance();

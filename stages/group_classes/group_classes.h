@@ -36,10 +36,10 @@ struct GroupClassesOptions {
   AdjustSurveyOptions adjustment;
   FindAmbiguousOptions ambiguity;
   PersistenceOptions persistence;
+  // A file beside which matches are sorted that memory has no room for; "": all are in memory.  No option.
+  std::string scratch_beside;
 };
 OptionTable DescribeOptions(GroupClassesOptions* options);
-
-Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path);
 
 struct GroupClassesResult {
   Classes classes;
@@ -61,7 +61,7 @@ struct GroupClassesResult {
 // order of time, if there are several: then classes have an age, and those that are probably gone by now are
 // `vanished` (persistence/persistence.h).  Classes are ascending by their first observation.  Errors:
 // InvalidArgument (options), NoData (no posed image, or no class left: says what dropped the
-// most), Cancelled.
+// most), Cancelled; where matches are read from a file, Corrupt; where they are sorted in one, DiskFull, Io.
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress, SolvedFile* solved = nullptr,

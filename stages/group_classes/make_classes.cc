@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 namespace cairn::group_classes {
 namespace {
@@ -29,14 +31,18 @@ std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& t
   return keypoints;
 }
 
-ClassAppearance AppearanceOf(const MatchedFeatures& matched, const Track& track,
-                             const Triangulation& triangulation, const std::vector<int>& matched_idx) {
+Result<ClassAppearance> AppearanceOf(const MatchedFeatures& matched, const Track& track,
+                                     const Triangulation& triangulation, const std::vector<int>& matched_idx,
+                                     MatchReader* reader) {
+  std::vector<std::shared_ptr<const DescriptorMatrix>> read;  // as long as rows of them are used
   std::vector<const uint8_t*> descriptors;
   DescriptorSpace space;
   for (const int i : triangulation.inliers) {
-    const Features& features = matched.features[matched_idx[track[i].image_idx]];
-    space = features.kind.space();
-    descriptors.push_back(features.descriptors.row(track[i].keypoint_idx).data());
+    const int idx = matched_idx[track[i].image_idx];
+    space = matched.features[idx].kind.space();
+    CAIRN_ASSIGN_OR_RETURN(auto of_image, reader->DescriptorsOf(idx));
+    descriptors.push_back(of_image->row(track[i].keypoint_idx).data());
+    read.push_back(std::move(of_image));
   }
   ClassAppearance appearance;
   DescribeClass(descriptors, space, &appearance);
@@ -64,10 +70,11 @@ FeatureClass ClassOf(const MatchedFeatures& matched, const Track& track, const T
 
 }  // namespace
 
-void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
-                 const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
-                 const GroupClassesOptions& options, Classes* classes,
-                 std::vector<DroppedItem>* dropped_items) {
+Status MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                   const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
+                   const GroupClassesOptions& options, Classes* classes,
+                   std::vector<DroppedItem>* dropped_items) {
+  CAIRN_ASSIGN_OR_RETURN(MatchReader reader, MatchReader::Open(matched));
   const auto drop = [&](size_t t, DropReason reason) {
     ++classes->dropped[DescribeDropReason(reason).name];
     dropped_items->push_back({.reason = reason,
@@ -85,7 +92,9 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
       continue;
     }
     candidates.push_back(t);
-    appearances.push_back(AppearanceOf(matched, tracks[t], triangulations[t], matched_idx));
+    CAIRN_ASSIGN_OR_RETURN(ClassAppearance appearance,
+                           AppearanceOf(matched, tracks[t], triangulations[t], matched_idx, &reader));
+    appearances.push_back(std::move(appearance));
   }
   const std::vector<Ambiguity> ambiguity =
       FindAmbiguous(appearances, classes->descriptor_kind.space(), options.ambiguity);
@@ -105,6 +114,7 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
     classes->classes.push_back(ClassOf(matched, tracks[t], triangulations[t], matched_idx, appearances[i]));
     classes->classes.back().class_id = class_id;
   }
+  return Ok();
 }
 
 }  // namespace cairn::group_classes

@@ -15,9 +15,10 @@ namespace cairn::group_classes {
 // either becomes a class or is dropped for one reason, and each keypoint of a track that becomes one is an
 // observation or an outlier.  triangulations[t] is that of tracks[t]; matched_idx[i] is where image i of the
 // tracks is in matched.images.
-void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
-                 const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
-                 const GroupClassesOptions& options, Classes* classes,
-                 std::vector<DroppedItem>* dropped_items);
+// Errors: as MatchReader.
+Status MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                   const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
+                   const GroupClassesOptions& options, Classes* classes,
+                   std::vector<DroppedItem>* dropped_items);
 
 }  // namespace cairn::group_classes

@@ -273,7 +273,13 @@ class SurveyAdjuster {
     problem_.observations.clear();
     problem_.points.clear();
     scales_.clear();
+    size_t num_seen = 0;  // at most
+    for (const Triangulation& triangulation : triangulations)
+      num_seen += std::min(triangulation.inliers.size(), kMaxNumObservations);
+    problem_.observations.reserve(num_seen);
+    scales_.reserve(num_seen);
     std::vector<TrackElement> seen;  // per observation
+    seen.reserve(num_seen);
     for (size_t t = 0; t < selected_.size(); ++t) {
       if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
       for (const int i : Spread(triangulations[t].inliers)) {

@@ -1,28 +1,15 @@
 #pragma once
 
-#include <map>
 #include <optional>
-#include <set>
-#include <string>
 #include <vector>
 
 #include "core/camera/pixel_ray.h"
 #include "core/capture/capture.h"
-#include "core/colmap/colmap_database.h"
-#include "core/features/features.h"
 #include "core/structure/triangulate.h"
 #include "core/structure/union_matches.h"
+#include "stages/group_classes/tracks/matched_features.h"
 
 namespace cairn::group_classes {
-
-// What the stage needs of matches.db.
-struct MatchedFeatures {
-  std::map<CameraId, Camera> cameras;
-  std::vector<DatabaseImage> images;        // ascending image_id
-  std::vector<Features> features;           // per image
-  std::vector<TwoViewGeometry> geometries;  // ascending pair
-  std::set<ImageId> landmark_images;        // whose features are landmarks of an earlier map
-};
 
 // The survey's images that have a pose, contiguous: as stated, and as they are known by now.
 struct PosedImages {

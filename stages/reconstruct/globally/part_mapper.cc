@@ -172,7 +172,7 @@ void PartMapper::MakeTracks() {
       matches.Add({pairs_[p].image1, match.idx1}, {pairs_[p].image2, match.idx2}, score);
   }
   int64_t num_conflicts = 0;
-  tracks_ = UnionMatches(std::move(matches), &num_conflicts);
+  tracks_ = UnionMatches(std::move(matches), &num_conflicts).value();
   std::erase_if(tracks_, [](const Track& track) { return static_cast<int>(track.size()) < kMinTrackLength; });
   std::stable_sort(tracks_.begin(), tracks_.end(),
                    [](const Track& a, const Track& b) { return a.size() > b.size(); });

@@ -72,7 +72,7 @@ std::vector<Track> TracksOfPosed(const PosedInput& posed, double max_error_px, i
     }
   }
   int64_t num_conflicts = 0;
-  return UnionMatches(std::move(matches), &num_conflicts);
+  return UnionMatches(std::move(matches), &num_conflicts).value();
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ std::vector<Track> Union(const std::vector<int>& num_keypoints, const std::vecto
                          int64_t* num_conflicts) {
   ScoredMatches matches(num_keypoints);
   for (const ScoredMatch& match : listed) matches.Add(match.element1, match.element2, match.dot_product);
-  return UnionMatches(std::move(matches), num_conflicts);
+  return UnionMatches(std::move(matches), num_conflicts).value();
 }
 
 TEST(UnionMatches, ChainsOfMatchesBecomeOneTrack) {

@@ -1,0 +1,145 @@
+#include "core/structure/scored_matches.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+#include <queue>
+#include <tuple>
+#include <utility>
+
+#include "core/files/temporary.h"
+#include "core/files/write_error.h"
+
+namespace cairn {
+namespace {
+
+constexpr size_t kNumReadAtOnce = 1 << 16;  // of a run
+
+// Reads or writes all bytes; returns false, and sets errno, where that is not possible.
+template <typename Transfer, typename Pointer>
+bool TransferAll(const Transfer& transfer, int file, Pointer bytes, size_t num_bytes, off_t offset) {
+  while (num_bytes > 0) {
+    const ssize_t num = transfer(file, bytes, num_bytes, offset);
+    if (num < 0 && errno == EINTR) continue;
+    if (num == 0) errno = EIO;
+    if (num <= 0) return false;
+    bytes += num;
+    num_bytes -= num;
+    offset += num;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool operator<(const ScoredMatches::Match& a, const ScoredMatches::Match& b) {
+  return std::tie(b.dot_product, a.keypoint1, a.keypoint2) <
+         std::tie(a.dot_product, b.keypoint1, b.keypoint2);
+}
+
+// The next match of a run of the file.
+class ScoredMatches::RunReader {
+ public:
+  RunReader(int file, size_t begin, size_t size) : file_(file), next_(begin), end_(begin + size) {}
+
+  // False at the end, and where the file cannot be read: then errno is set, else 0.
+  bool Advance() {
+    if (++place_ < buffer_.size()) return true;
+    errno = 0;
+    buffer_.resize(std::min(kNumReadAtOnce, end_ - next_));
+    place_ = 0;
+    if (buffer_.empty()) return false;
+    const bool is_read =
+        TransferAll(pread, file_, reinterpret_cast<char*>(buffer_.data()), buffer_.size() * sizeof(Match),
+                    static_cast<off_t>(next_ * sizeof(Match)));
+    next_ += buffer_.size();
+    return is_read;
+  }
+  const Match& match() const { return buffer_[place_]; }
+
+ private:
+  int file_;
+  size_t next_, end_;  // matches of the file
+  std::vector<Match> buffer_;
+  size_t place_ = 0;
+};
+
+ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints)
+    : ScoredMatches(num_keypoints, "", std::numeric_limits<size_t>::max()) {}
+
+ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints, std::string beside,
+                             size_t max_num_in_memory)
+    : first_keypoint_{0}, beside_(std::move(beside)), max_num_in_memory_(max_num_in_memory) {
+  for (const int num : num_keypoints) first_keypoint_.push_back(first_keypoint_.back() + num);
+}
+
+void ScoredMatches::Reserve(size_t num_matches) {
+  matches_.reserve(std::min(num_matches, max_num_in_memory_));
+}
+
+void ScoredMatches::Add(const TrackElement& element1, const TrackElement& element2, int32_t dot_product) {
+  if (matches_.size() >= max_num_in_memory_) WriteRun();
+  const auto keypoint = [&](const TrackElement& element) {
+    return first_keypoint_[element.image_idx] + static_cast<int32_t>(element.keypoint_idx);
+  };
+  matches_.push_back({keypoint(element1), keypoint(element2), dot_product});
+}
+
+void ScoredMatches::WriteRun() {
+  std::sort(matches_.begin(), matches_.end());
+  const size_t size = matches_.size();
+  const auto write = [&]() -> Status {
+    if (!file_) {
+      CAIRN_ASSIGN_OR_RETURN(const TemporaryFile made, CreateTemporary(beside_, 0600));
+      file_ = std::make_unique<FileDescriptor>(made.descriptor);
+      unlink(made.path.c_str());
+    }
+    size_t begin = 0;
+    for (const size_t run : run_sizes_) begin += run;
+    if (!TransferAll(pwrite, file_->get(), reinterpret_cast<const char*>(matches_.data()),
+                     size * sizeof(Match), static_cast<off_t>(begin * sizeof(Match))))
+      return WriteError(beside_, "cannot sort matches in a file beside it", errno);
+    return Ok();
+  };
+  if (status_.ok()) status_ = write();
+  if (status_.ok()) run_sizes_.push_back(size);
+  matches_.clear();
+}
+
+Status ScoredMatches::Visit(const std::function<void(const Match&)>& visit) && {
+  if (run_sizes_.empty() && status_.ok()) {
+    std::sort(matches_.begin(), matches_.end());
+    for (const Match& match : matches_) visit(match);
+    std::vector<Match>().swap(matches_);
+    return Ok();
+  }
+  if (!matches_.empty()) WriteRun();
+  std::vector<Match>().swap(matches_);
+  CAIRN_RETURN_IF_ERROR(status_);
+  std::vector<RunReader> runs;
+  size_t begin = 0;
+  for (const size_t size : run_sizes_)
+    runs.emplace_back(file_->get(), std::exchange(begin, begin + size), size);
+  const auto is_later = [&](size_t a, size_t b) { return runs[b].match() < runs[a].match(); };
+  std::priority_queue<size_t, std::vector<size_t>, decltype(is_later)> queue(is_later);
+  const auto advance = [&](size_t run) -> Status {
+    if (runs[run].Advance()) {
+      queue.push(run);
+    } else if (errno != 0) {
+      return WriteError(beside_, "cannot read the file beside it in which matches are sorted", errno);
+    }
+    return Ok();
+  };
+  for (size_t run = 0; run < runs.size(); ++run) CAIRN_RETURN_IF_ERROR(advance(run));
+  while (!queue.empty()) {
+    const size_t run = queue.top();
+    queue.pop();
+    visit(runs[run].match());
+    CAIRN_RETURN_IF_ERROR(advance(run));
+  }
+  return Ok();
+}
+
+}  // namespace cairn
