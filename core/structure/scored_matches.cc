@@ -44,18 +44,17 @@ class ScoredMatches::RunReader {
  public:
   RunReader(int file, size_t begin, size_t size) : file_(file), next_(begin), end_(begin + size) {}
 
-  // False at the end, and where the file cannot be read: then errno is set, else 0.
-  bool Advance() {
+  // False at the end.
+  Result<bool> Advance(const std::string& beside) {
     if (++place_ < buffer_.size()) return true;
-    errno = 0;
     buffer_.resize(std::min(kNumReadAtOnce, end_ - next_));
     place_ = 0;
     if (buffer_.empty()) return false;
-    const bool is_read =
-        TransferAll(pread, file_, reinterpret_cast<char*>(buffer_.data()), buffer_.size() * sizeof(Match),
-                    static_cast<off_t>(next_ * sizeof(Match)));
+    if (!TransferAll(pread, file_, reinterpret_cast<char*>(buffer_.data()), buffer_.size() * sizeof(Match),
+                     static_cast<off_t>(next_ * sizeof(Match))))
+      return WriteError(beside, "cannot read the file beside it in which matches are sorted", errno);
     next_ += buffer_.size();
-    return is_read;
+    return true;
   }
   const Match& match() const { return buffer_[place_]; }
 
@@ -75,10 +74,6 @@ ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints, std::string 
   for (const int num : num_keypoints) first_keypoint_.push_back(first_keypoint_.back() + num);
 }
 
-void ScoredMatches::Reserve(size_t num_matches) {
-  matches_.reserve(std::min(num_matches, max_num_in_memory_));
-}
-
 void ScoredMatches::Add(const TrackElement& element1, const TrackElement& element2, int32_t dot_product) {
   if (matches_.size() >= max_num_in_memory_) WriteRun();
   const auto keypoint = [&](const TrackElement& element) {
@@ -88,6 +83,10 @@ void ScoredMatches::Add(const TrackElement& element1, const TrackElement& elemen
 }
 
 void ScoredMatches::WriteRun() {
+  if (!status_.ok()) {
+    matches_.clear();
+    return;
+  }
   std::sort(matches_.begin(), matches_.end());
   const size_t size = matches_.size();
   const auto write = [&]() -> Status {
@@ -103,7 +102,7 @@ void ScoredMatches::WriteRun() {
       return WriteError(beside_, "cannot sort matches in a file beside it", errno);
     return Ok();
   };
-  if (status_.ok()) status_ = write();
+  status_ = write();
   if (status_.ok()) run_sizes_.push_back(size);
   matches_.clear();
 }
@@ -125,11 +124,8 @@ Status ScoredMatches::Visit(const std::function<void(const Match&)>& visit) && {
   const auto is_later = [&](size_t a, size_t b) { return runs[b].match() < runs[a].match(); };
   std::priority_queue<size_t, std::vector<size_t>, decltype(is_later)> queue(is_later);
   const auto advance = [&](size_t run) -> Status {
-    if (runs[run].Advance()) {
-      queue.push(run);
-    } else if (errno != 0) {
-      return WriteError(beside_, "cannot read the file beside it in which matches are sorted", errno);
-    }
+    CAIRN_ASSIGN_OR_RETURN(const bool has_next, runs[run].Advance(beside_));
+    if (has_next) queue.push(run);
     return Ok();
   };
   for (size_t run = 0; run < runs.size(); ++run) CAIRN_RETURN_IF_ERROR(advance(run));

@@ -38,10 +38,10 @@ class ScoredMatches {
   // REQUIRES: max_num_in_memory >= 1
   ScoredMatches(const std::vector<int>& num_keypoints, std::string beside, size_t max_num_in_memory);
 
-  // Makes room for so many, as far as they may be in memory.
-  void Reserve(size_t num_matches);
-  // A larger dot product is more alike.  Where a file cannot be written, Visit() says so.
+  // A larger dot product is more alike.
   void Add(const TrackElement& element1, const TrackElement& element2, int32_t dot_product);
+  // Whether the file could be written so far.
+  const Status& status() const { return status_; }
   // Calls visit(match) for all, most alike first; gives up their memory.  Errors: ReadOnly, DiskFull, Io.
   Status Visit(const std::function<void(const Match&)>& visit) &&;
 

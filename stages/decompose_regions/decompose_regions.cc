@@ -132,13 +132,14 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .min = 0},
       {.name = "best_num_repairs",
        .value = &o->best_num_repairs,
-       .help = "algorithm best: number of neighbourhoods that are covered again; time grows with it",
+       .help =
+           "algorithm best: number of neighbourhoods that are covered again, in each part of the world or "
+           "window; time grows with it",
        .min = 0},
       {.name = "best_window_stations",
        .value = &o->best_window_stations,
-       .help =
-           "algorithm best: least number of stations that are covered at once; a larger part of a world is "
-           "covered window by window",
+       .help = "algorithm best: number of stations that are covered at once, or what 120 regions cover if "
+               "that is more; a larger part of a world is covered window by window",
        .min = 1},
       {.name = "best_max_stations",
        .value = &o->best_max_stations,
@@ -195,17 +196,20 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
   }
   const bool is_small = world.num_stations() <= options.best_max_stations;
   if (options.algorithm == "best" && is_small) {
-    decomposition = AlgorithmBest(world, decomposition,
-                                  {.exchanges_per_station = options.best_exchanges_per_station,
-                                   .num_repairs = options.best_num_repairs,
-                                   .window_stations = options.best_window_stations,
-                                   .num_threads = num_threads},
-                                  seed, progress);
+    decomposition =
+        AlgorithmBest(world, decomposition,
+                      {.exchanges_per_station = options.best_exchanges_per_station,
+                       .num_repairs = options.best_num_repairs,
+                       .window_stations = options.best_window_stations,
+                       .with_bound = options.lower_bound == "auto" || options.lower_bound == "certified",
+                       .num_threads = num_threads},
+                      seed, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
     if (options.lower_bound == "counted")
       decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   } else if (options.lower_bound == "certified" && is_small) {
-    decomposition.lower_bound = CertifiedLowerBound(world, decomposition, num_threads);
+    decomposition.lower_bound = CertifiedLowerBound(world, decomposition, num_threads, progress);
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
   } else if (options.lower_bound != "none") {
     decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   }

@@ -52,10 +52,11 @@ struct DecomposeRegionsOptions {
   // Algorithm best: exchanges of a region for another, per coverable station, so that fewer stations are
   // uncovered (cover_annealing.h).  REQUIRES: >= 0
   int best_exchanges_per_station = 400;
-  // Algorithm best: number of neighbourhoods that are covered again (cover_search.h).  REQUIRES: >= 0
+  // Algorithm best: number of neighbourhoods that are covered again, in each part of the world or window
+  // (cover_search.h).  REQUIRES: >= 0
   int best_num_repairs = 60;
-  // Algorithm best: coverable stations that are covered at once, at least; larger parts of a world are
-  // covered window by window (algorithm_best.h).  REQUIRES: >= 1
+  // Algorithm best: coverable stations that are covered at once, or what 120 regions cover if that is more;
+  // larger parts of a world are covered window by window (algorithm_best.h).  REQUIRES: >= 1
   int best_window_stations = 1500;
   // Column generation takes two minutes for 60,000 stations: worlds larger than this get the regions of B.2
   // instead of best's, and the counted bound.  REQUIRES: >= 0

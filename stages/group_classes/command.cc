@@ -13,8 +13,8 @@
 namespace cairn::group_classes {
 namespace {
 
-// Bytes of memory per byte of the input file.
-constexpr double kMemoryPerFileByte = 2;
+// Bytes of memory per byte of the input file, where all poses are adjusted together and where none is.
+constexpr double kMemoryPerFileByte = 1.6, kMemoryPerFileByteUnadjusted = 0.8;
 
 struct Arguments {
   std::string matches;
@@ -114,7 +114,9 @@ std::string PersistenceText(const GroupClassesResult& result) {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
-  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches, kMemoryPerFileByte,
+  const bool may_adjust = arguments.options.refine_poses != "never";
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches,
+                                           may_adjust ? kMemoryPerFileByte : kMemoryPerFileByteUnadjusted,
                                            environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
   // A reconstruction refines the database's cameras, with the same numbers, along with the poses.  Of
@@ -130,11 +132,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   SolvedFile solved(SolvedPath(arguments.output));
   const auto group_and_write = [&]() -> Result<GroupClassesResult> {
-    GroupClassesOptions options = arguments.options;
-    options.scratch_beside = arguments.output;
     CAIRN_ASSIGN_OR_RETURN(GroupClassesResult result,
-                           GroupClasses(matched, capture, options, environment.num_threads,
-                                        *environment.progress, &solved, sessions));
+                           GroupClasses(matched, capture, arguments.options, environment.num_threads,
+                                        *environment.progress, &solved, sessions, arguments.output));
     CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
     return result;
   };

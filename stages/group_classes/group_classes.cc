@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "core/base/parallel.h"
 #include "core/capture/sessions.h"
@@ -31,9 +34,8 @@ std::vector<std::vector<bool>> FindRays(const MatchedFeatures& matched, const Po
 
 // Also lists pairs one of whose images has no pose.
 Result<std::vector<Track>> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed,
-                                       const GroupClassesOptions& options, int num_threads,
+                                       const std::string& scratch_beside, int num_threads, Progress& progress,
                                        std::vector<DroppedItem>* dropped_items, int64_t* num_conflicts) {
-  CAIRN_ASSIGN_OR_RETURN(MatchReader reader, MatchReader::Open(matched));
   std::map<ImageId, int> posed_idx;
   std::vector<int> num_keypoints;
   for (int i = 0; i < posed.num_images(); ++i) {
@@ -41,9 +43,18 @@ Result<std::vector<Track>> BuildTracks(const MatchedFeatures& matched, const Pos
     num_keypoints.push_back(static_cast<int>(matched.features[posed.feature_idx[i]].keypoints.size()));
   }
   const std::vector<std::vector<bool>> has_ray = FindRays(matched, posed, num_threads);
-  ScoredMatches matches = options.scratch_beside.empty()
+  if (std::accumulate(num_keypoints.begin(), num_keypoints.end(), int64_t{0}) > INT32_MAX) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: the images have more than {} keypoints; divide the survey, a map for each floor or "
+                     "building",
+                     matched.path, INT32_MAX);
+  }
+  ScoredMatches matches = scratch_beside.empty()
                               ? ScoredMatches(num_keypoints)
-                              : ScoredMatches(num_keypoints, options.scratch_beside, kMaxNumMatchesInMemory);
+                              : ScoredMatches(num_keypoints, scratch_beside, kMaxNumMatchesInMemory);
+  MatchReader reader(matched);
+  progress.Begin("read matches", posed.num_images(), "images");
+  int num_done = 0;  // images of which all pairs with later ones are read
   CAIRN_RETURN_IF_ERROR(reader.ForEachPair([&](const TwoViewGeometry& geometry) -> Status {
     const auto image1 = posed_idx.find(geometry.image_id1), image2 = posed_idx.find(geometry.image_id2);
     if (image1 == posed_idx.end() || image2 == posed_idx.end()) {
@@ -51,6 +62,8 @@ Result<std::vector<Track>> BuildTracks(const MatchedFeatures& matched, const Pos
                                 .item_id = PairIdFromImageIds(geometry.image_id1, geometry.image_id2)});
       return Ok();
     }
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading matches");
+    if (image1->second > num_done) progress.Advance(image1->second - std::exchange(num_done, image1->second));
     CAIRN_ASSIGN_OR_RETURN(const auto descriptors1, reader.DescriptorsOf(posed.feature_idx[image1->second]));
     CAIRN_ASSIGN_OR_RETURN(const auto descriptors2, reader.DescriptorsOf(posed.feature_idx[image2->second]));
     for (const Match& match : geometry.inliers) {
@@ -59,8 +72,10 @@ Result<std::vector<Track>> BuildTracks(const MatchedFeatures& matched, const Pos
           descriptors1->row(match.idx1).cast<int32_t>().dot(descriptors2->row(match.idx2).cast<int32_t>());
       matches.Add({image1->second, match.idx1}, {image2->second, match.idx2}, dot);
     }
-    return Ok();
+    return matches.status();
   }));
+  progress.Advance(posed.num_images() - num_done);
+  progress.End();
   return UnionMatches(std::move(matches), num_conflicts);
 }
 
@@ -171,7 +186,8 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress, SolvedFile* solved,
-                                        const std::vector<std::string>& sessions) {
+                                        const std::vector<std::string>& sessions,
+                                        const std::string& scratch_beside) {
   PosedImages posed = CollectPosedImages(matched, capture);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
@@ -181,9 +197,9 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   }
   GroupClassesResult result;
   ListUnposed(matched, posed, &result.dropped_items);
-  CAIRN_ASSIGN_OR_RETURN(
-      const std::vector<Track> tracks,
-      BuildTracks(matched, posed, options, num_threads, &result.dropped_items, &result.num_conflicts));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Track> tracks,
+                         BuildTracks(matched, posed, scratch_beside, num_threads, progress,
+                                     &result.dropped_items, &result.num_conflicts));
   result.num_tracks = static_cast<int64_t>(tracks.size());
 
   progress.Begin("triangulate tracks", 1, "rounds");

@@ -36,8 +36,6 @@ struct GroupClassesOptions {
   AdjustSurveyOptions adjustment;
   FindAmbiguousOptions ambiguity;
   PersistenceOptions persistence;
-  // A file beside which matches are sorted that memory has no room for; "": all are in memory.  No option.
-  std::string scratch_beside;
 };
 OptionTable DescribeOptions(GroupClassesOptions* options);
 
@@ -56,15 +54,18 @@ struct GroupClassesResult {
   std::vector<SessionPersistence> sessions;  // of a survey of several
 };
 
-// Pure; same result for any thread count, and for any file of what was `solved` before
-// (adjust/solved_file.h), which may be null.  `sessions`: those that the capture was joined from, in the
-// order of time, if there are several: then classes have an age, and those that are probably gone by now are
-// `vanished` (persistence/persistence.h).  Classes are ascending by their first observation.  Errors:
-// InvalidArgument (options), NoData (no posed image, or no class left: says what dropped the
-// most), Cancelled; where matches are read from a file, Corrupt; where they are sorted in one, DiskFull, Io.
+// Same result for any thread count, and for any file of what was `solved` before (adjust/solved_file.h),
+// which may be null.  `sessions`: those that the capture was joined from, in the order of time, if there are
+// several: then classes have an age, and those that are probably gone by now are `vanished`
+// (persistence/persistence.h).  `scratch_beside`: a file beside which matches that memory has no room for are
+// sorted; "": all are in memory.  Classes are ascending by their first observation.  Errors: InvalidArgument
+// (options), NoData (no posed image, or no class left: says what dropped the most), Unsupported (more
+// keypoints than 2^31), Cancelled; where matches are read from a file, Corrupt; where they are sorted in one,
+// ReadOnly, DiskFull, Io.
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress, SolvedFile* solved = nullptr,
-                                        const std::vector<std::string>& sessions = {});
+                                        const std::vector<std::string>& sessions = {},
+                                        const std::string& scratch_beside = "");
 
 }  // namespace cairn::group_classes

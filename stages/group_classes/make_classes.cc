@@ -8,6 +8,9 @@
 namespace cairn::group_classes {
 namespace {
 
+// Descriptors of classes that are in memory at once.
+constexpr size_t kRowsAtOnce = size_t{1} << 18;
+
 DropReason ReasonOf(const Track& track, const Triangulation& triangulation,
                     const TriangulateOptions& options) {
   if (triangulation.outcome == TriangulateOutcome::kSmallAngle) return DropReason::kSmallAngle;
@@ -31,19 +34,43 @@ std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& t
   return keypoints;
 }
 
-Result<ClassAppearance> AppearanceOf(const MatchedFeatures& matched, const Track& track,
-                                     const Triangulation& triangulation, const std::vector<int>& matched_idx,
-                                     MatchReader* reader) {
-  std::vector<std::shared_ptr<const DescriptorMatrix>> read;  // as long as rows of them are used
-  std::vector<const uint8_t*> descriptors;
-  DescriptorSpace space;
-  for (const int i : triangulation.inliers) {
-    const int idx = matched_idx[track[i].image_idx];
-    space = matched.features[idx].kind.space();
-    CAIRN_ASSIGN_OR_RETURN(auto of_image, reader->DescriptorsOf(idx));
-    descriptors.push_back(of_image->row(track[i].keypoint_idx).data());
-    read.push_back(std::move(of_image));
+// Descriptors of the keypoints of tracks [begin, end) that are kept, track by track: each image's are read
+// once.
+Result<std::vector<uint8_t>> ReadRows(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                                      const std::vector<Triangulation>& triangulations,
+                                      const std::vector<int>& matched_idx, size_t begin, size_t end,
+                                      MatchReader* reader) {
+  struct Row {
+    int image = 0;
+    KeypointIdx keypoint = 0;
+    size_t place = 0;
+  };
+  std::vector<Row> rows;
+  for (size_t t = begin; t < end; ++t) {
+    if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
+    for (const int i : triangulations[t].inliers)
+      rows.push_back({matched_idx[tracks[t][i].image_idx], tracks[t][i].keypoint_idx, rows.size()});
   }
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.image < b.image; });
+  const size_t dim = matched.features.front().kind.space().num_values;
+  std::vector<uint8_t> values(rows.size() * dim);
+  std::shared_ptr<const DescriptorMatrix> descriptors;
+  int image = -1;
+  for (const Row& row : rows) {
+    if (row.image != image) {
+      CAIRN_ASSIGN_OR_RETURN(descriptors, reader->DescriptorsOf(row.image));
+      image = row.image;
+    }
+    std::copy_n(descriptors->row(row.keypoint).data(), dim, &values[row.place * dim]);
+  }
+  return values;
+}
+
+ClassAppearance AppearanceOf(const Triangulation& triangulation, const uint8_t* rows,
+                             const DescriptorSpace& space) {
+  std::vector<const uint8_t*> descriptors;
+  for (size_t i = 0; i < triangulation.inliers.size(); ++i)
+    descriptors.push_back(rows + i * space.num_values);
   ClassAppearance appearance;
   DescribeClass(descriptors, space, &appearance);
   appearance.position = triangulation.position;
@@ -74,7 +101,6 @@ Status MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tra
                    const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
                    const GroupClassesOptions& options, Classes* classes,
                    std::vector<DroppedItem>* dropped_items) {
-  CAIRN_ASSIGN_OR_RETURN(MatchReader reader, MatchReader::Open(matched));
   const auto drop = [&](size_t t, DropReason reason) {
     ++classes->dropped[DescribeDropReason(reason).name];
     dropped_items->push_back({.reason = reason,
@@ -86,15 +112,23 @@ Status MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tra
   appearances.reserve(std::count_if(
       triangulations.begin(), triangulations.end(),
       [](const Triangulation& triangulation) { return triangulation.outcome == TriangulateOutcome::kOk; }));
-  for (size_t t = 0; t < tracks.size(); ++t) {
-    if (triangulations[t].outcome != TriangulateOutcome::kOk) {
-      drop(t, ReasonOf(tracks[t], triangulations[t], options.triangulation));
-      continue;
+  MatchReader reader(matched);
+  const DescriptorSpace space = matched.features.front().kind.space();
+  for (size_t begin = 0, end = 0; begin < tracks.size(); begin = end) {
+    for (size_t num_rows = 0; end < tracks.size() && num_rows < kRowsAtOnce; ++end)
+      num_rows += triangulations[end].inliers.size();
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<uint8_t> rows,
+                           ReadRows(matched, tracks, triangulations, matched_idx, begin, end, &reader));
+    const uint8_t* next = rows.data();
+    for (size_t t = begin; t < end; ++t) {
+      if (triangulations[t].outcome != TriangulateOutcome::kOk) {
+        drop(t, ReasonOf(tracks[t], triangulations[t], options.triangulation));
+        continue;
+      }
+      candidates.push_back(t);
+      appearances.push_back(AppearanceOf(triangulations[t], next, space));
+      next += triangulations[t].inliers.size() * space.num_values;
     }
-    candidates.push_back(t);
-    CAIRN_ASSIGN_OR_RETURN(ClassAppearance appearance,
-                           AppearanceOf(matched, tracks[t], triangulations[t], matched_idx, &reader));
-    appearances.push_back(std::move(appearance));
   }
   const std::vector<Ambiguity> ambiguity =
       FindAmbiguous(appearances, classes->descriptor_kind.space(), options.ambiguity);

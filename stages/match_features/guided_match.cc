@@ -287,6 +287,7 @@ std::vector<Match> GuideByEpipolarLines(const GuidedView& view1, const GuidedVie
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU);
   const double largest = svd.singularValues()[0];
   Eigen::Vector3d epipole2 = svd.matrixU().col(2);
+  if (!epipole2.allFinite()) return inliers;
   // Signs of M and of the epipole, chosen so that the planes of matches turn the same way.
   int sign = 0;
   for (const Match& match : inliers) {

@@ -97,6 +97,7 @@ TEST(LowerBound, NeverExceedsTheOptimumNorTheRegions) {
 // Bounds against the oracle for every number of uncovered stations.
 void ExpectBounds(const World& world, int k, int tau, uint64_t seed) {
   const AllRegions all(world, k, tau);
+  NoProgress progress;
   Result<Decomposition> result =
       DecomposeRegions(world, {.algorithm = "b2", .k = k, .tau = tau, .rho = 0}, seed);
   if (!result.ok()) return;
@@ -105,7 +106,7 @@ void ExpectBounds(const World& world, int k, int tau, uint64_t seed) {
   for (int max_uncovered = 0; max_uncovered <= num_coverable; ++max_uncovered) {
     result->uncovered.assign(max_uncovered, 0);
     const int optimum = all.Fewest(max_uncovered);
-    ASSERT_LE(CertifiedLowerBound(world, *result), optimum) << "seed " << seed;
+    ASSERT_LE(CertifiedLowerBound(world, *result, 1, progress), optimum) << "seed " << seed;
     ASSERT_LE(CountingBound(reduced, max_uncovered), optimum) << "seed " << seed;
   }
 }

@@ -136,11 +136,16 @@ TEST(LeastNumberOfRegions, AddsWhatPartsNeed) {
   // 2.5 and 1.2 regions.
   const std::vector<Certificate> parts = {{50, 5, 20}, {12, 3, 10}};
   EXPECT_EQ(LeastNumberOfRegions(parts, 0), 3 + 2);
-  // One station: worth a quarter of a region of the first part, 0.3 of one of the second.
-  EXPECT_EQ(LeastNumberOfRegions(parts, 1), 4);   // 3.7 - 0.3
-  EXPECT_EQ(LeastNumberOfRegions(parts, 3), 3);   // 3.7 - 0.9
-  EXPECT_EQ(LeastNumberOfRegions(parts, 12), 1);  // 3.7 - 3.6
-  EXPECT_EQ(LeastNumberOfRegions(parts, 13), 0);
+  // One station: worth a quarter of a region of the first part, 0.3 of one of the second, which has four.
+  EXPECT_EQ(LeastNumberOfRegions(parts, 1), 4);  // 3.7 - 0.3
+  EXPECT_EQ(LeastNumberOfRegions(parts, 3), 3);  // 3.7 - 0.9
+  EXPECT_EQ(LeastNumberOfRegions(parts, 4), 3);  // 2.5
+  EXPECT_EQ(LeastNumberOfRegions(parts, 6), 2);  // 2.5 - 2 * 0.25
+  EXPECT_EQ(LeastNumberOfRegions(parts, 7), 2);
+  EXPECT_EQ(LeastNumberOfRegions(parts, 13), 1);  // 2.5 - 9 * 0.25
+  EXPECT_EQ(LeastNumberOfRegions(parts, 14), 0);
+  // 1.2 - 8 * 0.02: of the second part's one region twelve stations leave nothing.
+  EXPECT_EQ(LeastNumberOfRegions({{60, 1, 50}, {12, 1, 12}}, 20), 2);
   EXPECT_EQ(LeastNumberOfRegions({{40, 10, 20}}, 2), 1);  // exactly
   EXPECT_EQ(LeastNumberOfRegions({}, 0), 0);
   EXPECT_EQ(LeastNumberOfRegions({{50, 5, 0}, {12, 3, 10}}, 0), 2);  // of the first nothing is proven
@@ -155,7 +160,7 @@ Decomposition BestInWindows(const World& world, const Decomposition& start, int 
 }
 
 TEST(BestInWindows, IsValidAndNoWorseThanItsStartForAnyNumberOfThreads) {
-  int num_start = 0, num_found = 0, num_at_once = 0;
+  int num_start = 0, num_found = 0, num_at_once = 0, num_uncovered = 0;
   for (uint64_t seed = 0; seed < 6; ++seed) {
     const World world = RandomWorld(16, 14, 120, seed % 2 == 1, seed);
     const int rho = seed % 3 == 0 ? 3 : 0;
@@ -167,8 +172,11 @@ TEST(BestInWindows, IsValidAndNoWorseThanItsStartForAnyNumberOfThreads) {
     EXPECT_LE(found.regions.size(), start->regions.size());
     EXPECT_LE(found.uncovered.size(), start->uncovered.size());
     EXPECT_LE(*found.lower_bound, static_cast<int>(found.regions.size()));
+    num_uncovered += static_cast<int>(found.uncovered.size());
     const Decomposition again = BestInWindows(world, *start, 1);
     ASSERT_EQ(again.regions.size(), found.regions.size());
+    EXPECT_EQ(again.lower_bound, found.lower_bound);
+    EXPECT_EQ(again.uncovered, found.uncovered);
     for (size_t r = 0; r < again.regions.size(); ++r) {
       EXPECT_EQ(again.regions[r].stations, found.regions[r].stations);
       EXPECT_EQ(again.regions[r].features, found.regions[r].features);
@@ -182,6 +190,7 @@ TEST(BestInWindows, IsValidAndNoWorseThanItsStartForAnyNumberOfThreads) {
       EXPECT_NEAR(*found.lower_bound, *at_once.lower_bound, 1) << seed;
   }
   EXPECT_LT(num_found, num_start);
+  EXPECT_GT(num_uncovered, 0);
   EXPECT_LE(2 * num_found, num_start + num_at_once);  // windows of few regions: more than half of the way
 }
 

@@ -156,19 +156,26 @@ TEST(ReducedSystem, TracesAndCovariancesAreThoseOfTheWholeSystem) {
   EXPECT_EQ(system.ValueOf({5, 0}), 1);
 }
 
+// A point that nothing sees, one of one ray, and one of two rays that are the same: their places along the
+// rays are not determined, but what the others determine is.
 TEST(ReducedSystem, WhatNothingDeterminesIsNoError) {
-  std::vector<double> values(2, 0);
-  const LinearCost cost(false, {1, 0, 2});
+  std::vector<double> points(9, 0), values(2, 0);
   SchurProblem problem;
+  for (const int point : {0, 1, 2}) problem.AddPoint(&points[3 * point]);
   double seen = 0, partly[2] = {0, 0};
-  problem.AddBlock(&seen, 1);
-  problem.AddBlock(partly, 2);
-  problem.AddResidual(&cost, nullptr, {0, 1});
+  const int first = problem.AddBlock(&seen, 1), second = problem.AddBlock(partly, 2);
+  const LinearCost alone(false, {1, 0, 2}), across(true, {1, 0, 0, 1, 0, 0}), down(true, {0, 1, 0, 0, 1, 0});
+  problem.AddResidual(&alone, nullptr, {first, second});
+  for (const int point : {1, 2, 2}) {
+    problem.AddResidual(&across, nullptr, {point, first, second});
+    problem.AddResidual(&down, nullptr, {point, first, second});
+  }
   const int unseen = problem.AddBlock(values.data(), 2);
   const ReducedSystem system(problem, 1);
   ASSERT_TRUE(system.ok());
   EXPECT_GE(system.Covariance(unseen).trace(), 1);
   EXPECT_NEAR(system.Trace(std::vector<ReducedSystem::Row>{{0, 0}}), 1, 1e-6);
+  EXPECT_GT(system.Covariance(second)(0, 0), 1e6);
 }
 
 }  // namespace

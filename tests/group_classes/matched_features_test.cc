@@ -95,11 +95,10 @@ TEST_F(MatchReaderTest, ReadsFromTheFileWhatWouldBeInMemory) {
   EXPECT_EQ(matched->features[2].keypoints.size(), 6u);
   // Descriptors of two images are kept, of one, of none, of all.
   for (const size_t max_num_bytes : {size_t{2} * 6 * 128, size_t{6} * 128, size_t{0}, size_t{1} << 20}) {
-    Result<MatchReader> reader = MatchReader::Open(*matched, max_num_bytes);
-    ASSERT_TRUE(reader.ok());
+    MatchReader reader(*matched, max_num_bytes);
     std::vector<std::shared_ptr<const DescriptorMatrix>> read;
     for (const int image : {0, 1, 0, 2, 3, 0, 4, 4, 1}) {
-      const auto descriptors = reader->DescriptorsOf(image);
+      const auto descriptors = reader.DescriptorsOf(image);
       ASSERT_TRUE(descriptors.ok());
       EXPECT_TRUE(**descriptors == survey_.features[image].descriptors) << image;
       read.push_back(*descriptors);
@@ -110,24 +109,43 @@ TEST_F(MatchReaderTest, ReadsFromTheFileWhatWouldBeInMemory) {
     EXPECT_EQ(read[5] == read[0], max_num_bytes == size_t{1} << 20);  // the first was not the last used
     EXPECT_EQ(read[7], read[6]);
     size_t num_matches = 0, num_in_memory = 0;
-    Result<MatchReader> in_memory = MatchReader::Open(survey_);
-    ASSERT_TRUE(in_memory.ok());
-    const auto pairs = PairsOf(&*reader, &num_matches);
-    EXPECT_THAT(pairs, testing::UnorderedElementsAreArray(PairsOf(&*in_memory, &num_in_memory)));
+    MatchReader in_memory(survey_);
+    const auto pairs = PairsOf(&reader, &num_matches);
+    EXPECT_THAT(pairs, testing::UnorderedElementsAreArray(PairsOf(&in_memory, &num_in_memory)));
     EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
     EXPECT_EQ(num_matches, num_in_memory);
-    EXPECT_TRUE(**in_memory->DescriptorsOf(3) == survey_.features[3].descriptors);
+    EXPECT_TRUE(**in_memory.DescriptorsOf(3) == survey_.features[3].descriptors);
   }
+}
+
+TEST_F(MatchReaderTest, KeepsWhatWasUsedLast) {
+  const Result<MatchedFeatures> matched = WriteAndRead();
+  ASSERT_TRUE(matched.ok());
+  MatchReader reader(*matched, size_t{2} * 6 * 128);
+  std::vector<std::shared_ptr<const DescriptorMatrix>> read;
+  for (const int image : {0, 1, 0, 2, 0, 1}) read.push_back(*reader.DescriptorsOf(image));
+  EXPECT_EQ(read[2], read[0]);
+  EXPECT_EQ(read[4], read[0]);  // 1 had not been used for longer
+  EXPECT_NE(read[5], read[1]);
+  EXPECT_TRUE(*read[5] == survey_.features[1].descriptors);
+}
+
+TEST_F(MatchReaderTest, AFileThatTakesItsPlaceIsAnother) {
+  const Result<MatchedFeatures> matched = WriteAndRead();
+  ASSERT_TRUE(matched.ok());
+  const DescriptorMatrix before = survey_.features[0].descriptors;
+  survey_.features[0].descriptors.row(0).setZero();
+  ASSERT_TRUE(WriteAndRead().ok());
+  EXPECT_TRUE(**MatchReader(*matched).DescriptorsOf(0) == before);
 }
 
 TEST_F(MatchReaderTest, EndsAtAnErrorOfTheVisitor) {
   const Result<MatchedFeatures> matched = WriteAndRead();
   ASSERT_TRUE(matched.ok());
   for (const MatchedFeatures* of : std::initializer_list<const MatchedFeatures*>{&*matched, &survey_}) {
-    Result<MatchReader> reader = MatchReader::Open(*of);
-    ASSERT_TRUE(reader.ok());
+    MatchReader reader(*of);
     int num_visited = 0;
-    const Status status = reader->ForEachPair([&](const TwoViewGeometry&) -> Status {
+    const Status status = reader.ForEachPair([&](const TwoViewGeometry&) -> Status {
       if (++num_visited == 3) return Error{ErrorCode::kCancelled, "enough"};
       return Ok();
     });
@@ -139,14 +157,14 @@ TEST_F(MatchReaderTest, EndsAtAnErrorOfTheVisitor) {
 
 TEST_F(MatchReaderTest, WhatIsNotThereIsCorrupt) {
   const auto error_of = [&](const std::string& sql) {
-    Result<MatchedFeatures> matched = WriteAndRead();
-    EXPECT_TRUE(matched.ok());
+    EXPECT_TRUE(WriteAndRead().ok());
     Execute(sql);
-    Result<MatchReader> reader = MatchReader::Open(*matched);
-    EXPECT_TRUE(reader.ok());
-    Status status = reader->ForEachPair([](const TwoViewGeometry&) { return Ok(); });
+    const Result<MatchedFeatures> matched = ReadMatchedFeatures(path_);
+    EXPECT_TRUE(matched.ok());
+    MatchReader reader(*matched);
+    Status status = reader.ForEachPair([](const TwoViewGeometry&) { return Ok(); });
     for (int image = 0; image < kNumImages && status.ok(); ++image) {
-      if (const auto descriptors = reader->DescriptorsOf(image); !descriptors.ok())
+      if (const auto descriptors = reader.DescriptorsOf(image); !descriptors.ok())
         status = descriptors.error();
     }
     EXPECT_FALSE(status.ok()) << sql;

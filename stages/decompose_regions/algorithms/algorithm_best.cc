@@ -115,7 +115,7 @@ void DropLeastUseful(const ReducedWorld& wide, int max_lost, std::vector<CoreReg
 PartCover CoverPart(const WorldPart& part, const std::vector<CoreRegion>& start, int max_uncovered,
                     const BestOptions& options, uint64_t seed, Progress& progress,
                     std::vector<CoreRegion>* useful) {
-  ColumnGeneration generation(part.world, max_uncovered, {});
+  ColumnGeneration generation(part.world, max_uncovered, {.cancel = &progress});
   std::vector<int> cover(AddStart(start, part, &generation.pool()));
   std::iota(cover.begin(), cover.end(), 0);
   generation.Run();
@@ -131,15 +131,16 @@ PartCover CoverPart(const WorldPart& part, const std::vector<CoreRegion>& start,
     found.cores.push_back(part.InWhole(generation.pool()[region]));
   }
   found.num_uncovered = static_cast<int>(std::count(open.begin(), open.end(), 1));
-  generation.LowerMaxUncovered(found.num_uncovered);
+  if (options.with_bound) generation.LowerMaxUncovered(found.num_uncovered);
   found.certificate = generation.certificate();
   if (useful != nullptr) *useful = UsefulRegions(generation.pool(), generation.lp(), part);
   return found;
 }
 
 // What is proven of a part by the linear program alone.
-Certificate Certify(const WorldPart& part, const std::vector<CoreRegion>& start, int max_uncovered) {
-  ColumnGeneration generation(part.world, max_uncovered, {});
+Certificate Certify(const WorldPart& part, const std::vector<CoreRegion>& start, int max_uncovered,
+                    const Progress& progress) {
+  ColumnGeneration generation(part.world, max_uncovered, {.cancel = &progress});
   AddStart(start, part, &generation.pool());
   generation.Run();
   return generation.certificate();
@@ -179,7 +180,7 @@ class PartwiseCover {
     for (size_t p = 0; p < parts_.size(); ++p) {
       const bool is_small = std::ssize(parts_[p].open) <= WindowStations(parts_[p], options);
       (is_small ? small : large).push_back(p);
-      num_items += std::ssize(parts_[p].open) * (is_small ? 1 : kNumRounds + 1);
+      num_items += std::ssize(parts_[p].open) * (is_small ? 1 : kNumRounds + (options.with_bound ? 1 : 0));
     }
     progress.Begin("save regions", num_items, "stations");
     // Those with most stations take longest.
@@ -201,11 +202,11 @@ class PartwiseCover {
     SpendWhatIsLeft();
   }
 
-  void Certify(int num_threads) {
+  void Certify(int num_threads, const Progress& progress) {
     ParallelFor(std::ssize(parts_), num_threads, [&](int64_t p) {
       Part& part = parts_[p];
-      part.certificate =
-          decompose_regions::Certify(CutOut(wide_, part.stations, part.open), part.cores, part.num_uncovered);
+      part.certificate = decompose_regions::Certify(CutOut(wide_, part.stations, part.open), part.cores,
+                                                    part.num_uncovered, progress);
     });
   }
 
@@ -261,13 +262,14 @@ class PartwiseCover {
     cores_ = std::move(cores);
   }
 
-  int NumUncovered(const std::vector<CoreRegion>& cores, const std::vector<StationIdx>& open) const {
-    std::vector<char> is_covered(wide_.num_stations(), 0);
-    for (const CoreRegion& core : cores) {
-      for (const StationIdx station : core.stations) is_covered[station] = 1;
-    }
-    return static_cast<int>(
-        std::count_if(open.begin(), open.end(), [&](StationIdx station) { return !is_covered[station]; }));
+  static int NumUncovered(const std::vector<CoreRegion>& cores, const std::vector<StationIdx>& open) {
+    std::vector<StationIdx> covered;
+    for (const CoreRegion& core : cores)
+      covered.insert(covered.end(), core.stations.begin(), core.stations.end());
+    std::sort(covered.begin(), covered.end());
+    return static_cast<int>(std::count_if(open.begin(), open.end(), [&](StationIdx station) {
+      return !std::binary_search(covered.begin(), covered.end(), station);
+    }));
   }
 
   // The whole core that a part of it belongs to.
@@ -400,10 +402,10 @@ void PartwiseCover::ImproveLarge(const BestOptions& options, Part* part, Progres
     DropLeastUseful(wide_, 0, &part->cores);
     part->num_uncovered = NumUncovered(part->cores, part->open);
   }
-  if (progress.Cancelled()) return;
+  if (progress.Cancelled() || !options.with_bound) return;
   useful.insert(useful.begin(), part->cores.begin(), part->cores.end());
-  part->certificate =
-      decompose_regions::Certify(CutOut(wide_, part->stations, part->open), useful, part->num_uncovered);
+  part->certificate = decompose_regions::Certify(CutOut(wide_, part->stations, part->open), useful,
+                                                 part->num_uncovered, progress);
   progress.Advance(std::ssize(part->open));
 }
 
@@ -419,9 +421,10 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
   return fewest;
 }
 
-int CertifiedLowerBound(const World& world, const Decomposition& decomposition, int num_threads) {
+int CertifiedLowerBound(const World& world, const Decomposition& decomposition, int num_threads,
+                        const Progress& progress) {
   PartwiseCover cover(world, decomposition, decomposition.seed);
-  cover.Certify(num_threads);
+  cover.Certify(num_threads, progress);
   return cover.LowerBound(static_cast<int>(decomposition.uncovered.size()));
 }
 

@@ -13,12 +13,14 @@ struct BestOptions {
   // Exchanges of a region for another, per coverable station, while annealing (cover_annealing.h).
   // REQUIRES: >= 0
   int exchanges_per_station = 400;
-  // Neighbourhoods that are covered again, in each window (cover_search.h).  REQUIRES: >= 0
+  // Neighbourhoods that are covered again, in each part or window (cover_search.h).  REQUIRES: >= 0
   int num_repairs = 60;
-  // Coverable stations that are covered at once: so many, or as many as some number of regions cover on
-  // average, if that is more.  REQUIRES: >= 1, >= 0
+  // Coverable stations that are covered at once.  REQUIRES: >= 1
   int window_stations = 1500;
+  // Or as many as so many regions cover on average, if that is more.  REQUIRES: >= 0
   int window_regions = 120;
+  // Whether a lower bound is wanted; without one it is 0.
+  bool with_bound = true;
   // The result does not depend on it.
   int num_threads = 1;
 };
@@ -39,6 +41,7 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
                             uint64_t seed, Progress& progress);
 
 // The lower bound alone, for a decomposition made by any algorithm.
-int CertifiedLowerBound(const World& world, const Decomposition& decomposition, int num_threads = 1);
+int CertifiedLowerBound(const World& world, const Decomposition& decomposition, int num_threads,
+                        const Progress& progress);
 
 }  // namespace cairn::decompose_regions

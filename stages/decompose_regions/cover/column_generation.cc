@@ -72,21 +72,34 @@ struct Proven {
 }  // namespace
 
 int LeastNumberOfRegions(const std::vector<Certificate>& parts, int max_uncovered) {
-  // Parts of a region, for sums over parts: rounded down, and what is subtracted up.
+  if (max_uncovered == 0) {
+    int least = 0;
+    for (const Certificate& part : parts) least += CeilRatio(part.total, part.most_of_region);
+    return least;
+  }
+  // Parts of a region: rounded down, what is lost by a station up.
   constexpr Wide kUnit = Wide{1} << 32;
-  Wide least = 0, most_of_station = 0;
+  struct Share {
+    Wide regions = 0, by_station = 0;
+  };
+  std::vector<Share> shares;
+  Wide least = 0;
   for (const Certificate& part : parts) {
     if (part.most_of_region <= 0) continue;
-    if (max_uncovered == 0) {
-      least += kUnit * CeilRatio(part.total, part.most_of_region);
-    } else {
-      least += kUnit * part.total / part.most_of_region;
-      most_of_station = std::max(
-          most_of_station, (kUnit * part.most_of_station + part.most_of_region - 1) / part.most_of_region);
-    }
+    const Wide most = part.most_of_region;
+    shares.push_back({kUnit * part.total / most, (kUnit * part.most_of_station + most - 1) / most});
+    least += shares.back().regions;
   }
-  least -= most_of_station * max_uncovered;
-  return least <= 0 ? 0 : static_cast<int>((least + kUnit - 1) / kUnit);
+  std::sort(shares.begin(), shares.end(),
+            [](const Share& a, const Share& b) { return a.by_station > b.by_station; });
+  Wide num_left = max_uncovered;
+  for (const Share& share : shares) {
+    if (share.by_station == 0) break;
+    const Wide num = std::min(num_left, (share.regions + share.by_station - 1) / share.by_station);
+    least -= std::min(share.regions, num * share.by_station);
+    num_left -= num;
+  }
+  return static_cast<int>((least + kUnit - 1) / kUnit);
 }
 
 ColumnGeneration::ColumnGeneration(const ReducedWorld& wide, int max_uncovered,
@@ -135,7 +148,7 @@ void ColumnGeneration::AddNearlyAsValuable(Random* random) {
 
 void ColumnGeneration::Run() {
   if (pool_.size() == 0) return;
-  for (int round = 0; round < options_.num_rounds; ++round) {
+  for (int round = 0; round < options_.num_rounds && !IsCancelled(); ++round) {
     lp_.Iterate(options_.num_lp_iterations);
     if (Price(lp_) < 5) break;
   }
@@ -152,7 +165,7 @@ void ColumnGeneration::LowerMaxUncovered(int max_uncovered) {
 void ColumnGeneration::RunExactRounds() {
   const int64_t max_work = options_.max_work_ratio * wide_.areas.num_values();
   int64_t total_work = 0;
-  for (int round = 0; round < options_.num_exact_rounds; ++round) {
+  for (int round = 0; round < options_.num_exact_rounds && !IsCancelled(); ++round) {
     if (total_work > options_.max_total_work_ratio * wide_.areas.num_values()) break;
     lp_.Iterate(options_.num_exact_iterations);
     const DualValues dual = RoundedDual(lp_.station_values(), pool_, max_uncovered_);

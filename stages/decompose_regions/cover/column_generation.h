@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/progress.h"
 #include "core/base/random.h"
 #include "stages/decompose_regions/cover/cover_lp.h"
 #include "stages/decompose_regions/cover/exact_pricing.h"
@@ -13,12 +14,13 @@ namespace cairn::decompose_regions {
 
 // Effort of column generation; counts, not times, so that the result does not depend on the machine.
 struct ColumnGenerationOptions {
-  int num_rounds = 30;              // of greedy pricing, at most
-  int num_exact_rounds = 24;        // of exact pricing, at most
-  int num_lp_iterations = 150;      // between two greedy pricings
-  int num_exact_iterations = 1000;  // of the linear program, between two exact pricings
-  int min_new_regions = 20;         // a round adds at most this many regions, or the following share of the
-  double max_new_ratio = 0.125;     // coverable stations if that is more
+  int num_rounds = 30;               // of greedy pricing, at most
+  int num_exact_rounds = 24;         // of exact pricing, at most
+  int num_lp_iterations = 150;       // between two greedy pricings
+  int num_exact_iterations = 1000;   // of the linear program, between two exact pricings
+  int min_new_regions = 20;          // a round adds at most this many regions, or the following share of the
+  double max_new_ratio = 0.125;      // coverable stations if that is more
+  const Progress* cancel = nullptr;  // no more rounds are made when it is cancelled; null: never
   // Steps of exact pricing for each incidence of the world: of one pricing before it settles for a weaker
   // bound, and of all pricings for one number of uncovered stations.
   int64_t max_work_ratio = 2000, max_total_work_ratio = 10000;
@@ -28,14 +30,15 @@ struct ColumnGenerationOptions {
 // passes, that prove how many regions are needed (ColumnGeneration).
 struct Certificate {
   int64_t total = 0;            // sum of y_v
-  int64_t most_of_station = 0;  // z: the largest y_v
+  int64_t most_of_station = 0;  // z: at least the largest y_v
   int64_t most_of_region = 0;   // M: at least what any region's core is worth; 0: nothing is proven
 };
 
 // The least number of regions of all parts together that leave at most H coverable stations uncovered,
-// anywhere.  Each part's values are divided by its M:
-//   |D|  >=  sum over parts of total / M  -  H max over parts of z / M
-// rounded up; where H is 0, each part's share is rounded up.
+// anywhere.  Of a part that leaves h, there are
+//   |D| >= max(0, (total - h z) / M)
+// so the least of all is that where what may be left is left in the parts whose stations are worth most of a
+// region, as far as there is something to lose.  Rounded up; where H is 0, each part's share is rounded up.
 int LeastNumberOfRegions(const std::vector<Certificate>& parts, int max_uncovered);
 
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
@@ -74,6 +77,7 @@ class ColumnGeneration {
   void AddNearlyAsValuable(Random* random);
 
  private:
+  bool IsCancelled() const { return options_.cancel != nullptr && options_.cancel->Cancelled(); }
   void RunExactRounds();
   int AddMostValuable(const StationValues& values, std::vector<CoreRegion> found);
 

@@ -110,7 +110,9 @@ WorldPart CutOut(const ReducedWorld& wide, std::vector<StationIdx> stations,
   std::sort(part.features.begin(), part.features.end());
   part.features.erase(std::unique(part.features.begin(), part.features.end()), part.features.end());
   const auto num_stations = static_cast<int>(part.stations.size());
-  std::vector<int32_t> place(wide.num_stations(), -1);
+  // One for each thread, -1 between calls: of many small parts none clears the whole world's.
+  thread_local std::vector<int32_t> place;
+  if (std::ssize(place) < wide.num_stations()) place.resize(wide.num_stations(), -1);
   for (int i = 0; i < num_stations; ++i) place[part.stations[i]] = i;
   std::vector<int32_t> kept;
   const auto keep = [&](std::span<const StationIdx> some, const std::vector<char>* which) {
@@ -134,6 +136,7 @@ WorldPart CutOut(const ReducedWorld& wide, std::vector<StationIdx> stations,
     world.original.push_back(wide.original[feature]);
   }
   world.sets = world.areas.Transposed(num_stations);
+  for (const StationIdx station : part.stations) place[station] = -1;
   return part;
 }
 

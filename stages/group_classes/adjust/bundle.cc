@@ -289,14 +289,20 @@ Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Ob
 
 bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence) {
   BundleOptions piece = options;
+  int num_told = 0;  // steps
   for (int num_left = options.max_num_iterations;;) {
     if (options.num_steps_at_once > 0)
       piece.max_num_iterations = std::min(num_left, options.num_steps_at_once);
     const BundleOutcome outcome = AdjustOnce(piece, problem, evidence);
     num_left -= outcome.num_steps;
+    num_told += piece.max_num_iterations;
     const bool has_ended = outcome.has_converged || outcome.was_stopped ||
                            outcome.num_steps < piece.max_num_iterations || num_left <= 0;
-    if (has_ended) return outcome.has_converged;
+    if (has_ended) {
+      if (options.steps != nullptr && !outcome.was_stopped)
+        options.steps->Advance(options.max_num_iterations - num_told);
+      return outcome.has_converged;
+    }
     piece.initial_trust_region_radius = outcome.trust_region_radius;
   }
 }

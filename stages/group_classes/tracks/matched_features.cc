@@ -12,7 +12,6 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<MatchedFeatures> {
     MatchedFeatures matched;
-    matched.path = matches_path;
     CAIRN_ASSIGN_OR_RETURN(matched.cameras, ReadDatabaseCameras(database));
     CAIRN_ASSIGN_OR_RETURN(matched.images, ReadDatabaseImages(database));
     CAIRN_ASSIGN_OR_RETURN(const DescriptorKind kind, ReadDescriptorKind(database, matches_path));
@@ -26,42 +25,36 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
       matched.features.push_back(std::move(features));
     }
     matched.landmark_images = ReadLandmarkImages(database);
+    matched.path = matches_path;
+    matched.database = std::make_shared<SQLite::Database>(std::move(database));
     return matched;
   });
 }
 
-Result<MatchReader> MatchReader::Open(const MatchedFeatures& matched, size_t max_num_bytes) {
-  MatchReader reader(matched, max_num_bytes);
-  if (matched.path.empty()) return reader;
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matched.path));
-  reader.database_ = std::make_unique<SQLite::Database>(std::move(database));
-  return reader;
-}
-
 Status MatchReader::ForEachPair(const std::function<Status(const TwoViewGeometry&)>& visit) {
-  if (!database_) {
-    for (const TwoViewGeometry& geometry : matched_->geometries) CAIRN_RETURN_IF_ERROR(visit(geometry));
+  if (!matched_.database) {
+    for (const TwoViewGeometry& geometry : matched_.geometries) CAIRN_RETURN_IF_ERROR(visit(geometry));
     return Ok();
   }
-  return WithDatabaseErrors(matched_->path,
-                            [&]() -> Status { return ForEachTwoViewGeometry(*database_, 1, visit); });
+  return WithDatabaseErrors(matched_.path,
+                            [&]() -> Status { return ForEachTwoViewGeometry(*matched_.database, 1, visit); });
 }
 
 Result<std::shared_ptr<const DescriptorMatrix>> MatchReader::DescriptorsOf(int image) {
-  const Features& features = matched_->features[image];
-  if (!database_)
+  const Features& features = matched_.features[image];
+  if (!matched_.database)
     return std::shared_ptr<const DescriptorMatrix>(std::shared_ptr<void>(), &features.descriptors);
   if (const auto kept = kept_.find(image); kept != kept_.end()) {
     images_.splice(images_.begin(), images_, kept->second.place);
     return kept->second.descriptors;
   }
-  const DatabaseImage& of = matched_->images[image];
-  return WithDatabaseErrors(matched_->path, [&]() -> Result<std::shared_ptr<const DescriptorMatrix>> {
+  const DatabaseImage& of = matched_.images[image];
+  return WithDatabaseErrors(matched_.path, [&]() -> Result<std::shared_ptr<const DescriptorMatrix>> {
     CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix read,
-                           ReadDatabaseDescriptors(*database_, of.image_id, features.kind));
+                           ReadDatabaseDescriptors(*matched_.database, of.image_id, features.kind));
     if (static_cast<size_t>(read.rows()) != features.keypoints.size()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
-                       matched_->path, of.name, features.keypoints.size(), read.rows());
+      return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors", matched_.path,
+                       of.name, features.keypoints.size(), read.rows());
     }
     const auto bytes_of = [](const DescriptorMatrix& matrix) {
       return static_cast<size_t>(matrix.rows() * matrix.cols());

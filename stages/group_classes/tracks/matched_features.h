@@ -5,7 +5,6 @@
 #include <list>
 #include <map>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <unordered_map>
@@ -25,6 +24,8 @@ struct MatchedFeatures {
   std::vector<Features> features;           // per image
   std::vector<TwoViewGeometry> geometries;  // ascending pair
   std::set<ImageId> landmark_images;        // whose features are landmarks of an earlier map
+  // Open as long as this lives: a file that takes its place meanwhile is another one.
+  std::shared_ptr<SQLite::Database> database;
   std::string path;
 };
 
@@ -34,9 +35,9 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path);
 // Reads the descriptors and geometries of matched features, those of few images at once.
 class MatchReader {
  public:
-  // Keeps so many bytes of descriptors, and those that were read last.  `matched` outlives it.  Errors: as
-  // ReadMatchedFeatures.
-  static Result<MatchReader> Open(const MatchedFeatures& matched, size_t max_num_bytes = size_t{256} << 20);
+  // Keeps so many bytes of descriptors, and those that were read last.  `matched` outlives it.
+  explicit MatchReader(const MatchedFeatures& matched, size_t max_num_bytes = size_t{256} << 20)
+      : matched_(matched), max_num_bytes_(max_num_bytes) {}
 
   // Pairs with inliers, ascending.  Errors: Corrupt; of `visit`.
   Status ForEachPair(const std::function<Status(const TwoViewGeometry&)>& visit);
@@ -44,12 +45,8 @@ class MatchReader {
   Result<std::shared_ptr<const DescriptorMatrix>> DescriptorsOf(int image);
 
  private:
-  explicit MatchReader(const MatchedFeatures& matched, size_t max_num_bytes)
-      : matched_(&matched), max_num_bytes_(max_num_bytes) {}
-
-  const MatchedFeatures* matched_;
+  const MatchedFeatures& matched_;
   size_t max_num_bytes_, num_bytes_ = 0;
-  std::unique_ptr<SQLite::Database> database_;  // null: all is in memory
   // Of which descriptors are kept, the last used first.
   std::list<int> images_;
   struct Kept {
