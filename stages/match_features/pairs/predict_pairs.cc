@@ -42,17 +42,14 @@ void PairPredictor::Add(int idx1, int idx2, const std::vector<Match>& inliers) {
 PairPredictor::Links PairPredictor::CollectLinks(size_t first_match) const {
   Links links;
   links.begin.resize(view_of_.size() + 2, 0);
-  const std::span matches = std::span(matches_).subspan(first_match);
+  const std::span matches = std::span(matches_).subspan(first_match - num_forgotten_);
   for (const auto& [f, h] : matches) {
     ++links.begin[f + 2];
     ++links.begin[h + 2];
   }
   for (size_t f = 2; f < links.begin.size(); ++f) links.begin[f] += links.begin[f - 1];
   links.feature.resize(2 * matches.size());
-  links.view.resize(2 * matches.size());
   for (const auto& [f, h] : matches) {
-    links.view[links.begin[f + 1]] = view_of_[h];
-    links.view[links.begin[h + 1]] = view_of_[f];
     links.feature[links.begin[f + 1]++] = h;
     links.feature[links.begin[h + 1]++] = f;
   }
@@ -71,19 +68,18 @@ bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, const PredictP
 
 void PairPredictor::LinkAll() {
   Links added = CollectLinks(num_linked_);
-  num_linked_ = matches_.size();
+  num_linked_ = num_matches();
   if (links_.feature.empty()) {
     links_ = std::move(added);
     return;
   }
   // From the last feature on, so that nothing is overwritten that is still to be moved.
+  links_.feature.reserve(links_.feature.size() + added.feature.size());  // no more than that
   links_.feature.resize(links_.feature.size() + added.feature.size());
-  links_.view.resize(links_.feature.size());
   for (size_t f = view_of_.size(); f-- > 0;) {
     const uint64_t begin = links_.begin[f], end = links_.begin[f + 1];
     const uint64_t added_begin = added.begin[f], added_end = added.begin[f + 1];
     MoveAndInsert(begin, end, added.feature, added_begin, added_end, &links_.feature);
-    MoveAndInsert(begin, end, added.view, added_begin, added_end, &links_.view);
   }
   for (size_t f = 0; f < links_.begin.size(); ++f) links_.begin[f] += added.begin[f];
 }
@@ -91,7 +87,7 @@ void PairPredictor::LinkAll() {
 std::vector<char> PairPredictor::ImagesToExamine(const std::set<int>& without) const {
   const bool is_first = num_predicted_from_ == 0;
   int first_changed = std::numeric_limits<int>::max();
-  for (size_t i = num_predicted_from_; i < matches_.size(); ++i) {
+  for (size_t i = num_predicted_from_ - num_forgotten_; i < matches_.size(); ++i) {
     const auto& [f, h] = matches_[i];
     first_changed =
         std::min(first_changed, std::max(views_[view_of_[f]].generation, views_[view_of_[h]].generation));
@@ -107,9 +103,10 @@ std::vector<char> PairPredictor::NewlyLinked(int idx, const Links& new_links) co
   std::vector<char> linked(views_.size(), 0);
   const auto follow = [&](uint32_t f, const Links& first, const Links& second) {
     for (uint64_t i = first.begin[f]; i < first.begin[f + 1]; ++i) {
-      if (views_[first.view[i]].generation > views_[idx].generation) continue;
       const uint32_t middle = first.feature[i];
-      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k) linked[second.view[k]] = 1;
+      if (views_[view_of_[middle]].generation > views_[idx].generation) continue;
+      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k)
+        linked[view_of_[second.feature[k]]] = 1;
     }
   };
   for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
@@ -130,12 +127,12 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const std::vector<char>
   for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
     const Eigen::Vector3f& ray = Ray(f);
     for (uint64_t i = links_.begin[f]; i < links_.begin[f + 1]; ++i) {
-      if (views_[links_.view[i]].generation > views_[idx].generation) continue;
       const uint32_t middle = links_.feature[i];
+      if (views_[view_of_[middle]].generation > views_[idx].generation) continue;
       for (uint64_t k = links_.begin[middle]; k < links_.begin[middle + 1]; ++k) {
-        const int other = links_.view[k];
-        if (settled[other] || counted[other] == f + 1) continue;
         const uint32_t h = links_.feature[k];
+        const int other = view_of_[h];
+        if (settled[other] || counted[other] == f + 1) continue;
         const bool is_first = idx < other;
         if (!is_first && is_counted[h]) continue;
         if (ray.dot(Ray(h)) < min_cosine) continue;
@@ -160,11 +157,13 @@ Result<std::vector<PredictedPair>> PairPredictor::Predict(const IndexPairs& know
   std::vector<PredictedPair> pairs;
   const bool is_first = num_predicted_from_ == 0;
   if (std::find(to_examine.begin(), to_examine.end(), 1) == to_examine.end()) {
-    num_predicted_from_ = matches_.size();
+    num_predicted_from_ = num_matches();
     return pairs;
   }
   LinkAll();
   const Links new_links = is_first ? Links() : CollectLinks(num_predicted_from_);
+  num_forgotten_ = num_matches();
+  std::vector<std::pair<uint32_t, uint32_t>>().swap(matches_);
   std::vector<std::vector<int>> known_from(views_.size());
   for (const auto& [idx1, idx2] : known) {
     const bool is_from_first = IsFrom(idx1, idx2);
@@ -195,7 +194,7 @@ Result<std::vector<PredictedPair>> PairPredictor::Predict(const IndexPairs& know
   });
   progress.End();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while predicting pairs");
-  num_predicted_from_ = matches_.size();
+  num_predicted_from_ = num_matches();
   for (const std::vector<PredictedPair>& part : predicted)
     pairs.insert(pairs.end(), part.begin(), part.end());
   std::sort(pairs.begin(), pairs.end(),

@@ -58,20 +58,20 @@ class PairPredictor {
   // the calls of Add and any number of threads.  A later call only examines pairs that matches added since
   // the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls have the same
   // options, and the pairs of earlier calls in `known`.  Cost: sum over the features of the generations that
-  // are looked for of (matches)^2; later, of images with such pairs.  Memory: 24 bytes per match, twice that
-  // for a moment, and 28 per feature.  Errors: Cancelled.
+  // are looked for of (matches)^2; later, of images with such pairs.  Memory: 8 bytes per match, and for a
+  // moment another 8, and 8 to 24 for each since the last call; 28 per feature.  Errors: Cancelled.
   Result<std::vector<PredictedPair>> Predict(const IndexPairs& known, const PredictPairsOptions& options,
                                              int num_threads, Progress& progress,
                                              const std::set<int>& without = {});
 
  private:
-  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]], and their
-  // views.
+  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
   struct Links {
     std::vector<uint64_t> begin;
     std::vector<uint32_t> feature;
-    std::vector<int> view;
   };
+  // That were added.
+  size_t num_matches() const { return num_forgotten_ + matches_.size(); }
   // Links of the matches from `first_match` on.
   Links CollectLinks(size_t first_match) const;
   // All matches that were added are linked.
@@ -98,10 +98,13 @@ class PairPredictor {
   std::vector<View> views_;
   std::vector<uint32_t> first_feature_;  // of each view, counted over all; one more than views
   std::vector<int> view_of_;             // of each feature
+  // Matches in the order in which they were added: those that are linked, and that a call of Predict() has
+  // seen, are forgotten.
   std::vector<std::pair<uint32_t, uint32_t>> matches_;
-  Links links_;                    // of the first of matches_
+  size_t num_forgotten_ = 0;
+  Links links_;                    // of the first matches
   size_t num_linked_ = 0;          // so many
-  size_t num_predicted_from_ = 0;  // of matches_, at the last call of Predict
+  size_t num_predicted_from_ = 0;  // matches that were there at the last call of Predict
 };
 
 }  // namespace cairn::match_features
