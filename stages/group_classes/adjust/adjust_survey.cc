@@ -95,11 +95,11 @@ class SurveyAdjuster {
     findings_.noise = problem_.noise;
     findings_.camera_from_given = problem_.camera_from_given;
     LeftOutErrors as_stated, adjusted;
-    ParallelFor(2, num_threads_, [&](int64_t i) {
+    ForEachAdjustment(2, [&](int64_t i, const BundleOptions& options) {
       if (i == 0) {
-        as_stated = LeaveOut(OneOf(2), AsStated(problem_.camera_from_given));
+        as_stated = LeaveOut(options, AsStated(problem_.camera_from_given));
       } else {
-        adjusted = LeaveOut(OneOf(2), problem_);
+        adjusted = LeaveOut(options, problem_);
       }
     });
     const LeftOutGain gain = GainOf(problem_, as_stated, adjusted, -1);
@@ -294,10 +294,10 @@ class SurveyAdjuster {
       }
       problem_.points.push_back(triangulations[t].position);
     }
-    ForEachObservation(&problem_, [&](size_t k, BundleProblem::Observation* observation) {
+    ForEachObservation(num_threads_, &problem_, [&](size_t k, BundleProblem::Observation* observation) {
       observation->ray = RayOfTrack(matched_, posed_, seen[k]);
     });
-    SetCameras(variants_, false, &problem_);
+    SetCameras(variants_, false, num_threads_, &problem_);
     SetKeypointNoise();
   }
 
@@ -312,7 +312,8 @@ class SurveyAdjuster {
   }
 
   // The variants' parameters as blocks about the cameras as stated, where `afresh`, or as they are.
-  void SetCameras(const std::vector<int>& variants, bool afresh, BundleProblem* problem) const {
+  void SetCameras(const std::vector<int>& variants, bool afresh, int num_threads,
+                  BundleProblem* problem) const {
     for (size_t c = 0; c < variants.size(); ++c) {
       const CameraVariant& variant = candidates_[c][variants[c]];
       CameraBlock& block = problem->cameras[c];
@@ -327,7 +328,7 @@ class SurveyAdjuster {
       block.difference_sigma = variant.difference_sigma;
       if (block.difference_sigma > 0) block.difference_prior = block.prior[0] - block.prior[1];
     }
-    ForEachObservation(problem, [&](size_t, BundleProblem::Observation* observation) {
+    ForEachObservation(num_threads, problem, [&](size_t, BundleProblem::Observation* observation) {
       const int c = problem->images[observation->image_idx].camera_idx;
       const Camera& camera = afresh ? candidates_[c][variants[c]].camera : posed_.cameras[c];
       if (afresh) {
@@ -339,12 +340,12 @@ class SurveyAdjuster {
     });
   }
 
-  // set(k, &observation) for each of a problem's, on all threads.
+  // set(k, &observation) for each of a problem's.
   template <typename Set>
-  void ForEachObservation(BundleProblem* problem, const Set& set) const {
+  static void ForEachObservation(int num_threads, BundleProblem* problem, const Set& set) {
     constexpr size_t kAtOnce = 256;
     std::vector<BundleProblem::Observation>& observations = problem->observations;
-    ParallelFor((std::ssize(observations) + kAtOnce - 1) / kAtOnce, num_threads_, [&](int64_t chunk) {
+    ParallelFor((std::ssize(observations) + kAtOnce - 1) / kAtOnce, num_threads, [&](int64_t chunk) {
       const size_t begin = chunk * kAtOnce, end = std::min(begin + kAtOnce, observations.size());
       for (size_t k = begin; k < end; ++k) set(k, &observations[k]);
     });
@@ -397,11 +398,14 @@ class SurveyAdjuster {
     }
   }
 
-  // Options of one of several adjustments that are made one beside the other.
-  BundleOptions OneOf(int num_adjustments) const {
+  // Several adjustments, adjust(i, options): one beside the other where there are no more threads than these,
+  // else one after the other on all threads.
+  template <typename Adjust>
+  void ForEachAdjustment(int64_t num_adjustments, const Adjust& adjust) const {
+    const bool is_side_by_side = NumThreads(num_threads_) <= num_adjustments;
     BundleOptions options = bundle_options_;
-    options.num_threads = std::max(1, NumThreads(num_threads_) / num_adjustments);
-    return options;
+    if (is_side_by_side) options.num_threads = 1;
+    ParallelFor(num_adjustments, is_side_by_side ? num_threads_ : 1, [&](int64_t i) { adjust(i, options); });
   }
 
   // The problem with the poses that are stated, and this offset.
@@ -423,13 +427,13 @@ class SurveyAdjuster {
     for (const auto& of_camera : candidates_) num_variants = std::max(num_variants, of_camera.size());
     if (num_variants == 1) return false;
     std::vector<LeftOutErrors> tried(num_variants);
-    ParallelFor(static_cast<int64_t>(num_variants), num_threads_, [&](int64_t v) {
+    ForEachAdjustment(static_cast<int64_t>(num_variants), [&](int64_t v, const BundleOptions& options) {
       std::vector<int> variants;
       for (const auto& of_camera : candidates_)
         variants.push_back(static_cast<int>(std::min<size_t>(v, of_camera.size() - 1)));
       BundleProblem problem = problem_;
-      SetCameras(variants, true, &problem);
-      tried[v] = LeaveOut(OneOf(static_cast<int>(num_variants)), std::move(problem));
+      SetCameras(variants, true, options.num_threads, &problem);
+      tried[v] = LeaveOut(options, std::move(problem));
     });
     bool changed = false;
     for (size_t c = 0; c < candidates_.size(); ++c) {
