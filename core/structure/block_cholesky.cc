@@ -273,8 +273,9 @@ void BlockCholesky::SetColumn(int position, const double* values) {
 void BlockCholesky::UpdateTile(const Supernode& supernode, int tile) {
   const int tile_begin = supernode.tiles[tile], tile_end = supernode.tiles[tile + 1];
   RowMajorMap target(&values_[supernode.begin], supernode.row_begin.back(), supernode.width);
-  // One for each thread: allocated anew for each tile, they would be cleared by the system each time.
-  thread_local std::vector<double> strips, values;
+  // Not kept by threads: what ends with a thread takes memory to register, and glibc aborts where there is
+  // none.
+  std::vector<double> strips, values;
   for (const Supernode::Update& update : supernode.updates) {
     const Supernode& other = supernodes_[update.supernode];
     const auto from =

@@ -275,10 +275,10 @@ bool SchurSystem::EliminatePoint(int point, const Eigen::VectorXd& damping) {
 // A column of the reduced matrix, and its rows of the right side.
 void SchurSystem::SetColumn(int position, const Eigen::VectorXd& damping, Eigen::VectorXd* right_side) {
   const int size = cholesky_->size(position), first_row = cholesky_->first_row(position);
-  // One for each thread: allocated anew for each column, they would be cleared by the system each time.
-  thread_local std::vector<int> begin;  // per position: of its rows in the column
-  thread_local std::vector<double> column;
-  begin.resize(cholesky_->num_blocks());
+  // Not kept by threads: what ends with a thread takes memory to register, and glibc aborts where there is
+  // none.
+  std::vector<int> begin(cholesky_->num_blocks());  // per position: of its rows in the column
+  std::vector<double> column;
   int num_rows = 0;
   for (const int row : cholesky_->RowsOf(position)) {
     begin[row] = num_rows;

@@ -110,23 +110,16 @@ WorldPart CutOut(const ReducedWorld& wide, std::vector<StationIdx> stations,
   std::sort(part.features.begin(), part.features.end());
   part.features.erase(std::unique(part.features.begin(), part.features.end()), part.features.end());
   const auto num_stations = static_cast<int>(part.stations.size());
-  // One for each thread, -1 between calls: of many small parts none clears the whole world's.
-  thread_local std::vector<int32_t> place;
-  if (std::ssize(place) < wide.num_stations()) place.resize(wide.num_stations(), -1);
-  for (int i = 0; i < num_stations; ++i) place[part.stations[i]] = i;
   std::vector<int32_t> kept;
   const auto keep = [&](std::span<const StationIdx> some, const std::vector<char>* which) {
-    kept.clear();
-    for (const StationIdx station : some) {
-      const int32_t i = place[station];
-      if (i >= 0 && (which == nullptr || (*which)[i])) kept.push_back(i);
-    }
+    kept = PlacesOf(part.stations, some);
+    if (which != nullptr) std::erase_if(kept, [&](int32_t i) { return (*which)[i] == 0; });
     return std::span<const int32_t>(kept);
   };
   ReducedWorld& world = part.world;
   world.k = wide.k;
   world.coverable.assign(num_stations, 0);
-  for (const StationIdx station : open) world.coverable[place[station]] = 1;
+  for (const int32_t i : PlacesOf(part.stations, open)) world.coverable[i] = 1;
   world.num_coverable = static_cast<int>(open.size());
   for (const StationIdx station : part.stations)
     world.neighbours.Append(keep(wide.neighbours[station], nullptr));
@@ -136,7 +129,6 @@ WorldPart CutOut(const ReducedWorld& wide, std::vector<StationIdx> stations,
     world.original.push_back(wide.original[feature]);
   }
   world.sets = world.areas.Transposed(num_stations);
-  for (const StationIdx station : part.stations) place[station] = -1;
   return part;
 }
 

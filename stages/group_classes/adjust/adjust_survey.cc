@@ -294,10 +294,12 @@ class SurveyAdjuster {
       }
       problem_.points.push_back(triangulations[t].position);
     }
-    ForEachObservation(num_threads_, &problem_, [&](size_t k, BundleProblem::Observation* observation) {
-      observation->ray = RayOfTrack(matched_, posed_, seen[k]);
+    constexpr int64_t kAtOnce = 256;
+    ParallelFor((std::ssize(seen) + kAtOnce - 1) / kAtOnce, num_threads_, [&](int64_t chunk) {
+      for (int64_t k = chunk * kAtOnce; k < std::min(std::ssize(seen), (chunk + 1) * kAtOnce); ++k)
+        problem_.observations[k].ray = RayOfTrack(matched_, posed_, seen[k]);
     });
-    SetCameras(variants_, false, num_threads_, &problem_);
+    SetCameras(variants_, false, &problem_);
     SetKeypointNoise();
   }
 
@@ -312,8 +314,7 @@ class SurveyAdjuster {
   }
 
   // The variants' parameters as blocks about the cameras as stated, where `afresh`, or as they are.
-  void SetCameras(const std::vector<int>& variants, bool afresh, int num_threads,
-                  BundleProblem* problem) const {
+  void SetCameras(const std::vector<int>& variants, bool afresh, BundleProblem* problem) const {
     for (size_t c = 0; c < variants.size(); ++c) {
       const CameraVariant& variant = candidates_[c][variants[c]];
       CameraBlock& block = problem->cameras[c];
@@ -328,27 +329,16 @@ class SurveyAdjuster {
       block.difference_sigma = variant.difference_sigma;
       if (block.difference_sigma > 0) block.difference_prior = block.prior[0] - block.prior[1];
     }
-    ForEachObservation(num_threads, problem, [&](size_t, BundleProblem::Observation* observation) {
-      const int c = problem->images[observation->image_idx].camera_idx;
+    for (BundleProblem::Observation& observation : problem->observations) {
+      const int c = problem->images[observation.image_idx].camera_idx;
       const Camera& camera = afresh ? candidates_[c][variants[c]].camera : posed_.cameras[c];
       if (afresh) {
-        if (const auto ray = MakePixelRay(camera, observation->pixel)) observation->ray = *ray;
+        if (const auto ray = MakePixelRay(camera, observation.pixel)) observation.ray = *ray;
       }
-      observation->camera = {};
+      observation.camera = {};
       if (!problem->cameras[c].free.empty())
-        observation->camera = SensitivityOf(camera, observation->pixel, problem->cameras[c].free);
-    });
-  }
-
-  // set(k, &observation) for each of a problem's.
-  template <typename Set>
-  static void ForEachObservation(int num_threads, BundleProblem* problem, const Set& set) {
-    constexpr size_t kAtOnce = 256;
-    std::vector<BundleProblem::Observation>& observations = problem->observations;
-    ParallelFor((std::ssize(observations) + kAtOnce - 1) / kAtOnce, num_threads, [&](int64_t chunk) {
-      const size_t begin = chunk * kAtOnce, end = std::min(begin + kAtOnce, observations.size());
-      for (size_t k = begin; k < end; ++k) set(k, &observations[k]);
-    });
+        observation.camera = SensitivityOf(camera, observation.pixel, problem->cameras[c].free);
+    }
   }
 
   // An adjustment that finds poses and focal length together makes that too long: a longer one moves pixels
@@ -432,7 +422,7 @@ class SurveyAdjuster {
       for (const auto& of_camera : candidates_)
         variants.push_back(static_cast<int>(std::min<size_t>(v, of_camera.size() - 1)));
       BundleProblem problem = problem_;
-      SetCameras(variants, true, options.num_threads, &problem);
+      SetCameras(variants, true, &problem);
       tried[v] = LeaveOut(options, std::move(problem));
     });
     bool changed = false;
