@@ -51,4 +51,10 @@ void ParallelFor(int64_t num_items, int num_threads, const std::function<void(in
   if (first_exception) std::rethrow_exception(first_exception);
 }
 
+void ParallelForRuns(int64_t num_items, int64_t run_length, int num_threads,
+                     const std::function<void(int64_t, int64_t)>& body) {
+  ParallelFor((num_items + run_length - 1) / run_length, num_threads,
+              [&](int64_t run) { body(run * run_length, std::min(num_items, (run + 1) * run_length)); });
+}
+
 }  // namespace cairn

@@ -13,5 +13,9 @@ int NumThreads(int requested);
 // results do not depend on the number of threads.  An exception from a body is rethrown here, after all
 // have stopped.
 void ParallelFor(int64_t num_items, int num_threads, const std::function<void(int64_t)>& body);
+// The same for items of which many are worth a call: body(begin, end) for runs of `run_length`, the last one
+// may be shorter.  REQUIRES: run_length >= 1
+void ParallelForRuns(int64_t num_items, int64_t run_length, int num_threads,
+                     const std::function<void(int64_t, int64_t)>& body);
 
 }  // namespace cairn

@@ -8,31 +8,7 @@
 extern "C" void omp_set_max_active_levels(int max_levels);
 
 namespace cairn {
-namespace {
-
-class IterationProgress : public ceres::IterationCallback {
- public:
-  IterationProgress(Progress* progress, int max_num_iterations)
-      : progress_(progress), num_left_(max_num_iterations) {}
-
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
-    if (step.iteration > 0 && num_left_ > 0) {
-      --num_left_;
-      progress_->Advance();
-    }
-    return progress_->Cancelled() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
-  }
-
-  void Finish() {
-    if (progress_ != nullptr) progress_->Advance(num_left_);
-  }
-
- private:
-  Progress* progress_;
-  int num_left_;
-};
-
-}  // namespace
+namespace {}  // namespace
 
 void StorePose(const Pose& pose, double* block) {
   Eigen::Map<Eigen::Vector4d> rotation(block);
@@ -100,29 +76,15 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   return true;
 }
 
-ceres::Problem::Options UncheckedProblem() {
-  ceres::Problem::Options options;
-  options.disable_all_safety_checks = true;
-  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  return options;
-}
-
-ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem,
-                                        Progress* progress) {
-  options.linear_solver_type =
-      options.linear_solver_ordering != nullptr ? ceres::SPARSE_SCHUR : ceres::SPARSE_NORMAL_CHOLESKY;
+ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem) {
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   // CHOLMOD would start four threads for each thread that solves: slower here, and not what --memory counts.
   omp_set_max_active_levels(0);
-  IterationProgress iterations(progress, options.max_num_iterations);
-  if (progress != nullptr) options.callbacks.push_back(&iterations);
   ceres::Solver::Summary summary;
   ceres::Solve(options, problem, &summary);
-  iterations.Finish();
   return summary;
 }
 

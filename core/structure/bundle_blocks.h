@@ -7,7 +7,6 @@
 #include <ceres/ceres.h>
 #include <Eigen/Core>
 
-#include "core/base/progress.h"
 #include "core/camera/pixel_ray.h"
 #include "core/geometry/pose.h"
 #include "core/structure/camera_sensitivity.h"
@@ -49,10 +48,7 @@ class ReprojectionCost : public ceres::CostFunction {
   double weight_;
 };
 
-// Of a problem whose costs, losses and manifolds are the caller's, unchecked.
-ceres::Problem::Options UncheckedProblem();
-
-// The costs of such a problem, side by side: Ceres would keep count of each of its own in a map.
+// The costs of a problem that refers to them, side by side.
 class BundleCosts {
  public:
   // Refers to its arguments, as ReprojectionCost does.
@@ -86,11 +82,7 @@ struct MotionCost {
   }
 };
 
-// On one thread: bit-stable.  By sparse Schur complement where the options have an ordering, whose first
-// group is eliminated, else by sparse Cholesky.  Sets what the options say of solver and threads. `progress`,
-// if there is one, is advanced by max_num_iterations: by 1 for each, and at the end by what is left. The
-// solver ends when it is cancelled; progress changes nothing else.
-ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem,
-                                        Progress* progress = nullptr);
+// By sparse Cholesky, on one thread: bit-stable.  Sets what the options say of solver and threads.
+ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem);
 
 }  // namespace cairn

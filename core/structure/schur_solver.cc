@@ -226,9 +226,8 @@ class SchurSolver {
     const SchurTerms& terms = system_.terms();
     const int64_t num_points = std::ssize(terms.points());
     Candidate followed = *candidate;
-    ParallelFor((num_points + kPointsAtOnce - 1) / kPointsAtOnce, options_.num_threads, [&](int64_t chunk) {
-      const int64_t end = std::min(num_points, (chunk + 1) * kPointsAtOnce);
-      for (int64_t p = chunk * kPointsAtOnce; p < end; ++p) {
+    ParallelForRuns(num_points, kPointsAtOnce, options_.num_threads, [&](int64_t begin, int64_t end) {
+      for (int64_t p = begin; p < end; ++p) {
         Eigen::Map<Eigen::Vector3d> point(&followed.values[terms.value_begin(terms.points()[p])]);
         point = PointFollower(terms, static_cast<int>(p), candidate->values).Follow(point);
       }

@@ -19,9 +19,8 @@ constexpr size_t kAhead = 3;            // so many slots of a column are on thei
 // body(i) for every i below `num_items`, in chunks.
 template <typename Body>
 void ForEach(int64_t num_items, int num_threads, const Body& body) {
-  ParallelFor((num_items + kPointsAtOnce - 1) / kPointsAtOnce, num_threads, [&](int64_t chunk) {
-    for (int64_t i = chunk * kPointsAtOnce; i < std::min(num_items, (chunk + 1) * kPointsAtOnce); ++i)
-      body(i);
+  ParallelForRuns(num_items, kPointsAtOnce, num_threads, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) body(i);
   });
 }
 

@@ -90,13 +90,13 @@ std::optional<double> SchurTerms::Evaluate(const std::vector<double>& values, bo
   const int64_t num_chunks = (num_residuals + kResidualsAtOnce - 1) / kResidualsAtOnce;
   std::vector<double> sums(num_chunks, 0);
   std::atomic<bool> is_possible = true;
-  ParallelFor(num_chunks, num_threads_, [&](int64_t chunk) {
+  ParallelForRuns(num_residuals, kResidualsAtOnce, num_threads_, [&](int64_t begin, int64_t end) {
     std::vector<double> scratch;
-    for (int64_t r = chunk * kResidualsAtOnce; r < std::min(num_residuals, (chunk + 1) * kResidualsAtOnce);
-         ++r) {
+    double& sum = sums[begin / kResidualsAtOnce];
+    for (int64_t r = begin; r < end; ++r) {
       const auto cost = EvaluateResidual(r, values, with_jacobians, &scratch);
       if (!cost) is_possible = false;
-      sums[chunk] += cost.value_or(0);
+      sum += cost.value_or(0);
     }
   });
   const double cost = std::accumulate(sums.begin(), sums.end(), 0.0);

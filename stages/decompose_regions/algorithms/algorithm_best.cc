@@ -1,12 +1,11 @@
 #include "stages/decompose_regions/algorithms/algorithm_best.h"
 
 #include <algorithm>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <queue>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -81,34 +80,12 @@ std::vector<CoreRegion> UsefulRegions(const RegionPool& pool, const CoverLp& lp,
   return useful;
 }
 
-// Drops the region that covers the fewest stations alone, repeatedly, as long as no more than `max_lost`
-// stations are in no region for it.
 void DropLeastUseful(const ReducedWorld& wide, int max_lost, std::vector<CoreRegion>* cores) {
-  std::vector<int> count(wide.num_stations(), 0);
-  for (const CoreRegion& core : *cores) {
-    for (const StationIdx station : core.stations) ++count[station];
-  }
-  const auto loss = [&](const CoreRegion& core) {
-    return static_cast<int>(std::count_if(core.stations.begin(), core.stations.end(),
-                                          [&](StationIdx station) { return count[station] == 1; }));
-  };
-  // Losses only grow: what is in the queue is at most what it is now.
-  using Entry = std::pair<int, size_t>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  for (size_t r = 0; r < cores->size(); ++r) queue.emplace(loss((*cores)[r]), r);
-  while (!queue.empty() && queue.top().first <= max_lost) {
-    const auto [least, r] = queue.top();
-    queue.pop();
-    CoreRegion& core = (*cores)[r];
-    if (const int now = loss(core); now > least) {
-      queue.emplace(now, r);
-      continue;
-    }
-    max_lost -= least;
-    for (const StationIdx station : core.stations) --count[station];
-    core.stations.clear();
-  }
-  std::erase_if(*cores, [](const CoreRegion& core) { return core.stations.empty(); });
+  std::vector<std::span<const StationIdx>> stations;
+  for (const CoreRegion& core : *cores) stations.emplace_back(core.stations);
+  const std::vector<char> is_kept = KeepMostUseful(stations, wide.num_stations(), max_lost);
+  size_t i = 0;
+  std::erase_if(*cores, [&](const CoreRegion&) { return is_kept[i++] == 0; });
 }
 
 // Covers a part's open stations but `max_uncovered`, with no more regions than `start` has.

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <limits>
+#include <functional>
+#include <queue>
 #include <utility>
 
 #include "core/base/random.h"
@@ -70,13 +71,14 @@ class CoverSearch {
     return cover;
   }
 
-  // Drops the region that covers the fewest stations alone, repeatedly, as long as the others suffice.
+  // Drops regions as long as the others suffice.
   void DropSuperfluous(std::vector<int>* cover) const {
-    while (!cover->empty()) {
-      std::vector<int> fewer = WithoutLeastUseful(*cover);
-      if (NumUncovered(fewer) > max_uncovered_) return;
-      *cover = std::move(fewer);
-    }
+    std::vector<std::span<const StationIdx>> cores;
+    for (const int region : *cover) cores.emplace_back(generation_.pool()[region].stations);
+    const std::vector<char> is_kept =
+        KeepMostUseful(cores, wide_.num_stations(), max_uncovered_ - NumUncovered(*cover));
+    size_t i = 0;
+    std::erase_if(*cover, [&](int) { return is_kept[i++] == 0; });
   }
 
   // Exchanges regions so that fewer stations are uncovered (cover_annealing.h), and drops regions that
@@ -122,32 +124,6 @@ class CoverSearch {
     return best;
   }
 
-  // A cover without the region that covers the fewest stations alone.  REQUIRES: not empty
-  std::vector<int> WithoutLeastUseful(std::vector<int> cover) const {
-    const std::vector<int> counts = CoverCounts(cover);
-    size_t least = 0;
-    ptrdiff_t least_loss = std::numeric_limits<ptrdiff_t>::max();
-    for (size_t i = 0; i < cover.size(); ++i) {
-      const std::vector<StationIdx>& stations = generation_.pool()[cover[i]].stations;
-      const ptrdiff_t loss = std::count_if(stations.begin(), stations.end(),
-                                           [&](StationIdx station) { return counts[station] == 1; });
-      if (loss < least_loss) {
-        least = i;
-        least_loss = loss;
-      }
-    }
-    cover.erase(cover.begin() + static_cast<ptrdiff_t>(least));
-    return cover;
-  }
-
-  std::vector<int> CoverCounts(const std::vector<int>& cover) const {
-    std::vector<int> counts(wide_.num_stations(), 0);
-    for (const int region : cover) {
-      for (const StationIdx station : generation_.pool()[region].stations) ++counts[station];
-    }
-    return counts;
-  }
-
   std::vector<char> OpenStations(const std::vector<int>& cover) const {
     std::vector<char> open = wide_.coverable;
     for (const int region : cover) {
@@ -163,6 +139,35 @@ class CoverSearch {
 };
 
 }  // namespace
+
+std::vector<char> KeepMostUseful(const std::vector<std::span<const StationIdx>>& cores, int num_stations,
+                                 int max_lost) {
+  std::vector<char> is_kept(cores.size(), 1);
+  std::vector<int> count(num_stations, 0);
+  for (const auto& core : cores) {
+    for (const StationIdx station : core) ++count[station];
+  }
+  const auto loss = [&](size_t r) {
+    return static_cast<int>(std::count_if(cores[r].begin(), cores[r].end(),
+                                          [&](StationIdx station) { return count[station] == 1; }));
+  };
+  // Losses only grow: what is in the queue is at most what it is now.
+  using Entry = std::pair<int, size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (size_t r = 0; r < cores.size(); ++r) queue.emplace(loss(r), r);
+  while (!queue.empty() && queue.top().first <= max_lost) {
+    const auto [least, r] = queue.top();
+    queue.pop();
+    if (const int now = loss(r); now > least) {
+      queue.emplace(now, r);
+      continue;
+    }
+    max_lost -= least;
+    for (const StationIdx station : cores[r]) --count[station];
+    is_kept[r] = 0;
+  }
+  return is_kept;
+}
 
 std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& wide, std::vector<int> start,
                              uint64_t seed, const CoverSearchOptions& options, Progress& progress) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/progress.h"
@@ -14,6 +15,11 @@ struct CoverSearchOptions {
   int exchanges_per_station = 400;  // of regions, per coverable station, while annealing
   int num_repairs = 60;             // neighbourhoods that are opened and covered again
 };
+
+// Drops the core that covers the fewest stations alone, the first of such, repeatedly, as long as no more
+// than `max_lost` stations are in none for it; below 0: none.  Returns, per core, whether it is kept.
+std::vector<char> KeepMostUseful(const std::vector<std::span<const StationIdx>>& cores, int num_stations,
+                                 int max_lost);
 
 // Few regions that cover all but H coverable stations, near the optimum of the linear relaxation: dives
 // (fixes the regions of largest x, solves again, adds regions that are worthwhile for the rest, and so on),

@@ -295,8 +295,8 @@ class SurveyAdjuster {
       problem_.points.push_back(triangulations[t].position);
     }
     constexpr int64_t kAtOnce = 256;
-    ParallelFor((std::ssize(seen) + kAtOnce - 1) / kAtOnce, num_threads_, [&](int64_t chunk) {
-      for (int64_t k = chunk * kAtOnce; k < std::min(std::ssize(seen), (chunk + 1) * kAtOnce); ++k)
+    ParallelForRuns(std::ssize(seen), kAtOnce, num_threads_, [&](int64_t begin, int64_t end) {
+      for (int64_t k = begin; k < end; ++k)
         problem_.observations[k].ray = RayOfTrack(matched_, posed_, seen[k]);
     });
     SetCameras(variants_, false, &problem_);

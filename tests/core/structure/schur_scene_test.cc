@@ -169,11 +169,24 @@ SchurSummary SolveOurs(const SchurSolverOptions& options, Scene* scene) {
   return SolveSchur(problem, options);
 }
 
+// Of costs, losses and manifolds that are the caller's.
+ceres::Problem::Options UncheckedProblem() {
+  ceres::Problem::Options options;
+  options.disable_all_safety_checks = true;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
 ceres::Solver::Summary SolveCeres(const SchurSolverOptions& options, Scene* scene) {
   ceres::Problem problem(UncheckedProblem());
   const Build build(scene, &problem, nullptr);
   ceres::Solver::Options ceres_options;
+  ceres_options.linear_solver_type = ceres::SPARSE_SCHUR;
   ceres_options.linear_solver_ordering = build.ordering;
+  ceres_options.num_threads = 1;
+  ceres_options.logging_type = ceres::SILENT;
   ceres_options.max_num_iterations = options.max_num_iterations;
   ceres_options.function_tolerance = options.function_tolerance;
   ceres_options.initial_trust_region_radius = options.initial_trust_region_radius;
@@ -186,7 +199,9 @@ ceres::Solver::Summary SolveCeres(const SchurSolverOptions& options, Scene* scen
         ceres_options.inner_iteration_ordering->AddElementToGroup(point.data(), 0);
     }
   }
-  return SolveOnOneThread(ceres_options, &problem);
+  ceres::Solver::Summary summary;
+  ceres::Solve(ceres_options, &problem, &summary);
+  return summary;
 }
 
 // Step by step: costs, trust, values.
