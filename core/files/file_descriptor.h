@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <utility>
 
 namespace cairn {
@@ -21,5 +23,10 @@ class FileDescriptor {
  private:
   int descriptor_;
 };
+
+// Reads or writes all bytes at `offset`; false, with errno, where that is not possible (EIO: the file ends
+// before).
+bool ReadAllAt(int descriptor, void* bytes, size_t num_bytes, uint64_t offset);
+bool WriteAllAt(int descriptor, const void* bytes, size_t num_bytes, uint64_t offset);
 
 }  // namespace cairn

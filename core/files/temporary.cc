@@ -54,4 +54,23 @@ Result<TemporaryFile> CreateTemporary(const std::string& target, mode_t mode) {
   return WriteError(target, "cannot be written: no file can be created beside it", errno);
 }
 
+Status ScratchFile::Append(const void* bytes, size_t num_bytes) {
+  if (!file_) {
+    CAIRN_ASSIGN_OR_RETURN(const TemporaryFile made, CreateTemporary(beside_, 0600));
+    file_.emplace(made.descriptor);
+    unlink(made.path.c_str());
+  }
+  if (!WriteAllAt(file_->get(), bytes, num_bytes, num_bytes_))
+    return WriteError(beside_, "the file beside it, of what memory has no room for, cannot be written",
+                      errno);
+  num_bytes_ += num_bytes;
+  return Ok();
+}
+
+Status ScratchFile::Read(uint64_t offset, void* bytes, size_t num_bytes) const {
+  if (!ReadAllAt(file_ ? file_->get() : -1, bytes, num_bytes, offset))
+    return WriteError(beside_, "the file beside it, of what memory has no room for, cannot be read", errno);
+  return Ok();
+}
+
 }  // namespace cairn

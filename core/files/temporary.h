@@ -2,9 +2,13 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/base/error.h"
+#include "core/files/file_descriptor.h"
 
 namespace cairn {
 
@@ -24,5 +28,23 @@ struct TemporaryFile {
 // Creates a file beside `target` with this mode, less the umask.  Never opens a file that already exists, nor
 // follows a link that somebody planted.  Errors: ReadOnly, DiskFull, Io.
 Result<TemporaryFile> CreateTemporary(const std::string& target, mode_t mode);
+
+// A file without a name for what memory has no room for: made where `beside` is when something is first
+// written to it, gone with this object.
+class ScratchFile {
+ public:
+  explicit ScratchFile(std::string beside) : beside_(std::move(beside)) {}
+
+  // Errors: ReadOnly, DiskFull, Io.
+  Status Append(const void* bytes, size_t num_bytes);
+  // On any thread.  REQUIRES: the bytes were appended.  Errors: Io.
+  Status Read(uint64_t offset, void* bytes, size_t num_bytes) const;
+  uint64_t num_bytes() const { return num_bytes_; }
+
+ private:
+  std::string beside_;
+  std::optional<FileDescriptor> file_;
+  uint64_t num_bytes_ = 0;
+};
 
 }  // namespace cairn

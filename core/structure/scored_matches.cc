@@ -1,36 +1,15 @@
 #include "core/structure/scored_matches.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <limits>
 #include <queue>
 #include <tuple>
 #include <utility>
 
-#include "core/files/temporary.h"
-#include "core/files/write_error.h"
-
 namespace cairn {
 namespace {
 
 constexpr size_t kNumReadAtOnce = 1 << 16;  // of a run
-
-// Reads or writes all bytes; returns false, and sets errno, where that is not possible.
-template <typename Transfer, typename Pointer>
-bool TransferAll(const Transfer& transfer, int file, Pointer bytes, size_t num_bytes, off_t offset) {
-  while (num_bytes > 0) {
-    const ssize_t num = transfer(file, bytes, num_bytes, offset);
-    if (num < 0 && errno == EINTR) continue;
-    if (num == 0) errno = EIO;
-    if (num <= 0) return false;
-    bytes += num;
-    num_bytes -= num;
-    offset += num;
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -42,24 +21,23 @@ bool operator<(const ScoredMatches::Match& a, const ScoredMatches::Match& b) {
 // The next match of a run of the file.
 class ScoredMatches::RunReader {
  public:
-  RunReader(int file, size_t begin, size_t size) : file_(file), next_(begin), end_(begin + size) {}
+  RunReader(const ScratchFile& file, size_t begin, size_t size)
+      : file_(file), next_(begin), end_(begin + size) {}
 
   // False at the end.
-  Result<bool> Advance(const std::string& beside) {
+  Result<bool> Advance() {
     if (++place_ < buffer_.size()) return true;
     buffer_.resize(std::min(kNumReadAtOnce, end_ - next_));
     place_ = 0;
     if (buffer_.empty()) return false;
-    if (!TransferAll(pread, file_, reinterpret_cast<char*>(buffer_.data()), buffer_.size() * sizeof(Match),
-                     static_cast<off_t>(next_ * sizeof(Match))))
-      return WriteError(beside, "cannot read the file beside it in which matches are sorted", errno);
+    CAIRN_RETURN_IF_ERROR(file_.Read(next_ * sizeof(Match), buffer_.data(), buffer_.size() * sizeof(Match)));
     next_ += buffer_.size();
     return true;
   }
   const Match& match() const { return buffer_[place_]; }
 
  private:
-  int file_;
+  const ScratchFile& file_;
   size_t next_, end_;  // matches of the file
   std::vector<Match> buffer_;
   size_t place_ = 0;
@@ -70,7 +48,7 @@ ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints)
 
 ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints, std::string beside,
                              size_t max_num_in_memory)
-    : first_keypoint_{0}, beside_(std::move(beside)), max_num_in_memory_(max_num_in_memory) {
+    : first_keypoint_{0}, max_num_in_memory_(max_num_in_memory), file_(std::move(beside)) {
   for (const int num : num_keypoints) first_keypoint_.push_back(first_keypoint_.back() + num);
 }
 
@@ -83,27 +61,11 @@ void ScoredMatches::Add(const TrackElement& element1, const TrackElement& elemen
 }
 
 void ScoredMatches::WriteRun() {
-  if (!status_.ok()) {
-    matches_.clear();
-    return;
+  if (status_.ok()) {
+    std::sort(matches_.begin(), matches_.end());
+    status_ = file_.Append(matches_.data(), matches_.size() * sizeof(Match));
   }
-  std::sort(matches_.begin(), matches_.end());
-  const size_t size = matches_.size();
-  const auto write = [&]() -> Status {
-    if (!file_) {
-      CAIRN_ASSIGN_OR_RETURN(const TemporaryFile made, CreateTemporary(beside_, 0600));
-      file_ = std::make_unique<FileDescriptor>(made.descriptor);
-      unlink(made.path.c_str());
-    }
-    size_t begin = 0;
-    for (const size_t run : run_sizes_) begin += run;
-    if (!TransferAll(pwrite, file_->get(), reinterpret_cast<const char*>(matches_.data()),
-                     size * sizeof(Match), static_cast<off_t>(begin * sizeof(Match))))
-      return WriteError(beside_, "cannot sort matches in a file beside it", errno);
-    return Ok();
-  };
-  status_ = write();
-  if (status_.ok()) run_sizes_.push_back(size);
+  if (status_.ok()) run_sizes_.push_back(matches_.size());
   matches_.clear();
 }
 
@@ -119,12 +81,11 @@ Status ScoredMatches::Visit(const std::function<void(const Match&)>& visit) && {
   CAIRN_RETURN_IF_ERROR(status_);
   std::vector<RunReader> runs;
   size_t begin = 0;
-  for (const size_t size : run_sizes_)
-    runs.emplace_back(file_->get(), std::exchange(begin, begin + size), size);
+  for (const size_t size : run_sizes_) runs.emplace_back(file_, std::exchange(begin, begin + size), size);
   const auto is_later = [&](size_t a, size_t b) { return runs[b].match() < runs[a].match(); };
   std::priority_queue<size_t, std::vector<size_t>, decltype(is_later)> queue(is_later);
   const auto advance = [&](size_t run) -> Status {
-    CAIRN_ASSIGN_OR_RETURN(const bool has_next, runs[run].Advance(beside_));
+    CAIRN_ASSIGN_OR_RETURN(const bool has_next, runs[run].Advance());
     if (has_next) queue.push(run);
     return Ok();
   };

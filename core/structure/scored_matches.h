@@ -3,13 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
-#include "core/files/file_descriptor.h"
+#include "core/files/temporary.h"
 
 namespace cairn {
 
@@ -53,10 +52,9 @@ class ScoredMatches {
   void WriteRun();
 
   std::vector<int32_t> first_keypoint_;
-  std::string beside_;
   size_t max_num_in_memory_;
   std::vector<Match> matches_;
-  std::unique_ptr<FileDescriptor> file_;
+  ScratchFile file_;
   std::vector<size_t> run_sizes_;  // of the file's runs, one after the other
   Status status_;
 };

@@ -1,0 +1,81 @@
+#include "core/files/temporary.h"
+
+#include <fcntl.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/files/file_descriptor.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::string Read(const ScratchFile& file, uint64_t offset, size_t num_bytes) {
+  std::string bytes(num_bytes, '?');
+  EXPECT_TRUE(file.Read(offset, bytes.data(), num_bytes).ok());
+  return bytes;
+}
+
+TEST(ScratchFile, GivesBackWhatWasAppendedAndLeavesNothing) {
+  const std::string folder = testing::TempDir() + "/scratch";
+  fs::remove_all(folder);
+  fs::create_directory(folder);
+  {
+    ScratchFile file(folder + "/output");
+    EXPECT_TRUE(fs::is_empty(folder));
+    ASSERT_TRUE(file.Append("some", 4).ok());
+    ASSERT_TRUE(file.Append(" bytes", 6).ok());
+    EXPECT_EQ(file.num_bytes(), 10u);
+    EXPECT_EQ(Read(file, 0, 10), "some bytes");
+    EXPECT_EQ(Read(file, 5, 3), "byt");
+    EXPECT_TRUE(fs::is_empty(folder)) << "the file has no name";
+    ScratchFile moved = std::move(file);
+    ASSERT_TRUE(moved.Append("!", 1).ok());
+    EXPECT_EQ(Read(moved, 9, 2), "s!");
+  }
+  EXPECT_TRUE(fs::is_empty(folder));
+}
+
+TEST(ScratchFile, SaysBesideWhatItCannotBeWrittenOrRead) {
+  ScratchFile nowhere("/nowhere/output");
+  const Status status = nowhere.Append("x", 1);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kIo);
+  EXPECT_THAT(status.error().message, HasSubstr("/nowhere/output"));
+  EXPECT_EQ(nowhere.num_bytes(), 0u);
+  ScratchFile file(testing::TempDir() + "/output");
+  ASSERT_TRUE(file.Append("x", 1).ok());
+  char byte;
+  const Status beyond = file.Read(1, &byte, 1);
+  ASSERT_FALSE(beyond.ok());
+  EXPECT_THAT(beyond.error().message, HasSubstr(testing::TempDir() + "/output"));
+}
+
+TEST(FileDescriptor, AllBytesAreReadAndWrittenOrItSaysWhyNot) {
+  const std::string path = testing::TempDir() + "/all_at";
+  std::ofstream(path) << "0123456789";
+  const FileDescriptor file(open(path.c_str(), O_RDWR));
+  std::string bytes(4, '?');
+  ASSERT_TRUE(ReadAllAt(file.get(), bytes.data(), 4, 6));
+  EXPECT_EQ(bytes, "6789");
+  EXPECT_FALSE(ReadAllAt(file.get(), bytes.data(), 4, 7));
+  EXPECT_EQ(errno, EIO) << "the file ends before";
+  ASSERT_TRUE(WriteAllAt(file.get(), "ab", 2, 9));
+  ASSERT_TRUE(ReadAllAt(file.get(), bytes.data(), 3, 8));
+  EXPECT_EQ(bytes, "8ab9");
+  const FileDescriptor full(open("/dev/full", O_WRONLY));
+  EXPECT_FALSE(WriteAllAt(full.get(), "ab", 2, 0));
+  EXPECT_EQ(errno, ENOSPC);
+}
+
+}  // namespace
+}  // namespace cairn
