@@ -1,5 +1,7 @@
 #include "core/line/memory.h"
 
+#include <malloc.h>
+
 #include <unistd.h>
 
 #include <algorithm>
@@ -64,6 +66,12 @@ Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mi
       ErrorCode::kFailed,
       "{} takes about {} MiB of memory, but --memory allows {} MiB; allow more, or use a larger machine",
       work, needed_mib, memory_mib);
+}
+
+void ReturnFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,

@@ -14,6 +14,11 @@ int64_t DefaultMemoryMib();
 // What the program takes before it reads anything, bytes: its libraries and their tables.
 inline constexpr int64_t kProgramBytes = int64_t{64} << 20;
 
+// Gives what was freed back to the system.  The C library keeps it, for each of the threads that asked for
+// it, and what another thread asks for is taken anew: after freeing much that many threads have made, and
+// before as much is made again.
+void ReturnFreedMemory();
+
 // Refuses work that is estimated not to fit, before it begins.  `work` names it: "grouping the matches of
 // m.db".  Errors: Failed, with the estimate and the limit.
 //

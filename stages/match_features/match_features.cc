@@ -91,23 +91,22 @@ Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, 
 }
 
 // What the predictor reads of the images, in the world frame.
-Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, const MatchImages& images,
-                                                   const Progress& progress) {
-  std::vector<PairPredictor::View> views;
-  for (const MatchImage& image : images.images) {
-    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
-    const Camera& camera = images.cameras.at(image.camera_id);
+Status AddViews(const MatchRun& run, PairPredictor* predictor) {
+  for (const MatchImage& image : run.images.images) {
+    if (run.progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
+    const Camera& camera = run.images.cameras.at(image.camera_id);
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> bearings,
-                           ReadImageBearings(features, image, camera));
-    PairPredictor::View& view = views.emplace_back();
+                           ReadImageBearings(run.features, image, camera));
+    PairPredictor::View view;
     view.center = image.cam_from_world->Center();
     view.focal_px = camera.MeanFocal();
     view.generation = GenerationOfSession(image.session);
     const Eigen::Quaterniond world_from_cam = image.cam_from_world->rotation.conjugate();
     for (const Eigen::Vector3d& bearing : bearings)
       view.rays.push_back((world_from_cam * bearing).cast<float>());
+    predictor->AddView(view);
   }
-  return views;
+  return Ok();
 }
 
 // What was predicted of earlier sessions may be known.
@@ -162,23 +161,44 @@ EarlierPartners PartnersBySession(const MatchImages& images, double ratio) {
   return {std::move(sessions), ratio};
 }
 
+// All pairs whose frusta overlap.
+Result<IndexPairs> OverlappingPairs(const std::vector<PosedCamera>& posed, const MatchRun& run) {
+  std::vector<std::vector<int>> partners(posed.size());
+  CAIRN_RETURN_IF_ERROR(RankOverlaps(posed, run.options.frustum, run.num_threads, run.progress,
+                                     [&](int idx, const std::vector<OverlapPartner>& ranked) {
+                                       for (const OverlapPartner& partner : ranked) {
+                                         if (partner.idx > idx) partners[idx].push_back(partner.idx);
+                                       }
+                                     }));
+  return PairsFromPartners(partners);
+}
+
+// The pairs of largest overlap.
+Result<IndexPairs> SeedPairs(const std::vector<PosedCamera>& posed, const MatchRun& run,
+                             EarlierPartners* partners) {
+  const MatchFeaturesOptions& options = run.options;
+  std::vector<EarlierPartners::Seeds> seeds(posed.size());
+  CAIRN_RETURN_IF_ERROR(RankOverlaps(posed, options.frustum, run.num_threads, run.progress,
+                                     [&](int idx, const std::vector<OverlapPartner>& ranked) {
+                                       seeds[idx] = partners->SeedsOf(idx, ranked, options.num_frustum_seeds,
+                                                                      options.num_frustum_scouts);
+                                     }));
+  return partners->TakeSeeds(seeds);
+}
+
 // Matches the pairs of largest overlap, then repeatedly those that the matches so far predict.
-Status MatchFrustum(SQLite::Database& database, MatchRun* run) {
+Status MatchFrustum(const std::string& matches_path, SQLite::Database& database, MatchRun* run) {
   const MatchFeaturesOptions& options = run->options;
-  const int num_threads = run->num_threads;
-  Progress& progress = run->progress;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<PosedCamera> posed, PosedCameras(run->images));
-  CAIRN_ASSIGN_OR_RETURN(OverlapRanking ranking, RankOverlaps(posed, options.frustum, num_threads, progress));
   if (options.num_frustum_seeds == 0) {
-    CAIRN_RETURN_IF_ERROR(MatchRound(FrustumPairs(ranking), nullptr, database, run));
+    CAIRN_ASSIGN_OR_RETURN(IndexPairs pairs, OverlappingPairs(posed, *run));
+    CAIRN_RETURN_IF_ERROR(MatchRound(std::move(pairs), nullptr, database, run));
     return Ok();
   }
   EarlierPartners partners = PartnersBySession(run->images, options.earlier_partners_ratio);
-  IndexPairs next = partners.Seeds(ranking, options.num_frustum_seeds, options.num_frustum_scouts);
-  ranking = {};
-  CAIRN_ASSIGN_OR_RETURN(std::vector<PairPredictor::View> views,
-                         ReadViews(run->features, run->images, progress));
-  PairPredictor predictor(std::move(views));
+  CAIRN_ASSIGN_OR_RETURN(IndexPairs next, SeedPairs(posed, *run, &partners));
+  PairPredictor predictor(matches_path, int64_t{options.matching.memory_budget_mib} << 20);
+  CAIRN_RETURN_IF_ERROR(AddViews(*run, &predictor));
   const PredictPairsOptions prediction = {
       .min_num_expected_matches = options.min_num_expected_matches,
       .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
@@ -220,6 +240,20 @@ Status CheckRanges(const MatchFeaturesOptions& options) {
   return Ok();
 }
 
+// What the stage keeps of an image and of its pairs beside features, for as long as it runs: up to 100 pairs
+// an image, as images of a lattice have that see hundreds of others.
+constexpr int64_t kKeptBytesPerImage = int64_t{16} << 10;
+// Features have at least this part of the memory.
+constexpr double kMinFeaturesRatio = 0.25;
+
+// The options with what is left of the memory for features.
+MatchFeaturesOptions WithMemoryForFeatures(MatchFeaturesOptions options, size_t num_images) {
+  int& budget_mib = options.matching.memory_budget_mib;
+  const auto kept_mib = static_cast<int>((static_cast<int64_t>(num_images) * kKeptBytesPerImage) >> 20);
+  budget_mib = std::max({1, static_cast<int>(kMinFeaturesRatio * budget_mib), budget_mib - kept_mib});
+  return options;
+}
+
 // A new list of what was dropped, with the images that have no features.
 void ReplaceDroppedItems(const MatchImages& images, SQLite::Database& database) {
   database.exec(
@@ -248,7 +282,7 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
       database.exec("BEGIN; DELETE FROM two_view_geometries");
       ReplaceDroppedItems(run->images, database);
       if (run->summary.pairs == "frustum") {
-        CAIRN_RETURN_IF_ERROR(MatchFrustum(database, run));
+        CAIRN_RETURN_IF_ERROR(MatchFrustum(matches_path, database, run));
       } else {
         CAIRN_RETURN_IF_ERROR(MatchRound(std::move(pairs), nullptr, database, run));
       }
@@ -270,7 +304,7 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
 Status WriteShard(const std::string& matches_path, MatchRun* run) {
   return WriteDatabase(matches_path, kColmapSchema, [&](SQLite::Database& database) -> Status {
     if (run->images.images.size() < 2) return Ok();
-    if (run->summary.pairs == "frustum") return MatchFrustum(database, run);
+    if (run->summary.pairs == "frustum") return MatchFrustum(matches_path, database, run);
     CAIRN_ASSIGN_OR_RETURN(std::optional<IndexPairs> pairs, SelectPairs(&database, run));
     if (!pairs) return Ok();
     CAIRN_RETURN_IF_ERROR(MatchRound(std::move(*pairs), nullptr, database, run));
@@ -289,10 +323,11 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenColmapDatabase(path));
   const auto images = WithDatabaseErrors(path, [&] { return ReadMatchImages(features, inputs.capture); });
   if (!images.ok()) return images.error();
+  const MatchFeaturesOptions bounded = WithMemoryForFeatures(options, images->images.size());
   MatchRun run{.features = features,
                .images = *images,
                .inputs = inputs,
-               .options = options,
+               .options = bounded,
                .reuse = reuse,
                .seed = seed,
                .num_threads = num_threads,

@@ -10,7 +10,7 @@
 #include "core/options/options.h"
 #include "core/world/feature_class.h"
 #include "stages/match_features/match_pairs.h"
-#include "stages/match_features/pairs/select_pairs.h"
+#include "stages/match_features/pairs/frustum_overlap.h"
 
 namespace cairn::match_features {
 

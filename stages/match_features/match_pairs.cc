@@ -8,6 +8,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/pooled.h"
+#include "core/line/memory.h"
 
 namespace cairn::match_features {
 namespace {
@@ -155,8 +156,11 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
     }
     if (next.valid()) {
       CAIRN_ASSIGN_OR_RETURN(features, next.get());
+      ReturnFreedMemory();  // those of the stretch that is done
     }
   }
+  features.clear();
+  ReturnFreedMemory();
   return Ok();
 }
 

@@ -1,5 +1,7 @@
 #include "stages/match_features/match_round.h"
 
+#include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace cairn::match_features {
@@ -27,6 +29,12 @@ struct Found {
 
 Result<Found> FindPairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources, MatchRun* run) {
   Found found;
+  if (std::all_of(sources.begin(), sources.end(),
+                  [](const ReuseSources* source) { return source->empty(); })) {
+    found.missing.resize(pairs.size());
+    std::iota(found.missing.begin(), found.missing.end(), 0);
+    return found;
+  }
   const double max_num_bytes = kHeldRatio * (1 << 20) * run->options.matching.memory_budget_mib;
   double num_bytes = 0;
   for (size_t i = 0; i < pairs.size(); ++i) {

@@ -17,6 +17,18 @@ std::vector<OverlapPartner> Ranked(const std::vector<int>& idxs) {
   return partners;
 }
 
+using Ranking = std::vector<std::vector<OverlapPartner>>;  // of each image
+
+IndexPairs Seeds(const Ranking& ranking, int num_best, int num_spread, EarlierPartners* partners) {
+  std::vector<EarlierPartners::Seeds> seeds;
+  for (int idx = 0; idx < static_cast<int>(ranking.size()); ++idx)
+    seeds.push_back(partners->SeedsOf(idx, ranking[idx], num_best, num_spread));
+  return partners->TakeSeeds(seeds);
+}
+IndexPairs Seeds(const Ranking& ranking, int num_best, int num_spread, EarlierPartners partners) {
+  return Seeds(ranking, num_best, num_spread, &partners);
+}
+
 TEST(EarlierPartners, GenerationsBeginAgainWithTheThirdSession) {
   EXPECT_EQ(GenerationOfSession(0), 0);
   EXPECT_EQ(GenerationOfSession(1), 0);
@@ -27,21 +39,23 @@ TEST(EarlierPartners, GenerationsBeginAgainWithTheThirdSession) {
 TEST(EarlierPartners, OfTwoSessionsTheSeedsAreThoseOfOneSurvey) {
   //   session    0 0 1 1
   //   image      0 1 2 3
-  const OverlapRanking ranking = {Ranked({2, 1, 3}), Ranked({0, 2, 3}), Ranked({0, 1, 3}), Ranked({2, 0, 1})};
-  EarlierPartners partners({0, 0, 1, 1}, 0);
+  const Ranking ranking = {Ranked({2, 1, 3}), Ranked({0, 2, 3}), Ranked({0, 1, 3}), Ranked({2, 0, 1})};
   for (const int num_best : {1, 2}) {
-    for (const int num_spread : {0, 1})
-      EXPECT_EQ(partners.Seeds(ranking, num_best, num_spread), FrustumSeeds(ranking, num_best, num_spread));
+    for (const int num_spread : {0, 1}) {
+      EXPECT_EQ(Seeds(ranking, num_best, num_spread, {{0, 0, 1, 1}, 0}),
+                Seeds(ranking, num_best, num_spread, {{0, 0, 0, 0}, 0}));
+    }
   }
+  EXPECT_THAT(Seeds(ranking, 1, 0, {{0, 0, 1, 1}, 0}), ElementsAre(Pair(0, 1), Pair(0, 2), Pair(2, 3)));
 }
 
 TEST(EarlierPartners, SeedsAreOfTheOwnSessionAndOfTheEarlierInTurns) {
   //   session    0 0 1 1 2 2         of 4 the ranks are 0 1 2 | 5 | 3; of its own session 5, of
   //   image      0 1 2 3 4 5         the earlier in turns, the latest first, 2 0 3 1
-  OverlapRanking ranking(6);
+  Ranking ranking(6);
   ranking[4] = Ranked({0, 1, 2, 5, 3});
   const auto seeds = [&](int num_best, int num_spread) {
-    return EarlierPartners({0, 0, 1, 1, 2, 2}, 1).Seeds(ranking, num_best, num_spread);
+    return Seeds(ranking, num_best, num_spread, {{0, 0, 1, 1, 2, 2}, 1});
   };
   EXPECT_THAT(seeds(1, 0), ElementsAre(Pair(2, 4), Pair(4, 5)));
   EXPECT_THAT(seeds(3, 0), ElementsAre(Pair(0, 4), Pair(2, 4), Pair(3, 4), Pair(4, 5)));
@@ -51,8 +65,8 @@ TEST(EarlierPartners, SeedsAreOfTheOwnSessionAndOfTheEarlierInTurns) {
 TEST(EarlierPartners, NoSeedOfAnImageIsOfALaterSession) {
   //   session    0 1 2     each ranks both others; that of session 0 could have one seed, and it is not 2
   //   image      0 1 2
-  const OverlapRanking ranking = {Ranked({2, 1}), Ranked({2, 0}), {}};
-  EXPECT_THAT(EarlierPartners({0, 1, 2}, 1).Seeds(ranking, 1, 0), ElementsAre(Pair(0, 1)));
+  const Ranking ranking = {Ranked({2, 1}), Ranked({2, 0}), {}};
+  EXPECT_THAT(Seeds(ranking, 1, 0, {{0, 1, 2}, 1}), ElementsAre(Pair(0, 1)));
 }
 
 TEST(EarlierPartners, PairsWithinAGenerationAreNotBounded) {
@@ -92,11 +106,11 @@ TEST(EarlierPartners, OfEqualPairsTheSmallerIndexIsChosen) {
 TEST(EarlierPartners, WhatWasChosenAndWhatWasNotCountsLater) {
   //   session    0 0 0 0 1 1 1 2
   //   image      0 1 2 3 4 5 6 7
-  OverlapRanking ranking(8);
+  Ranking ranking(8);
   ranking[7] = Ranked({4, 0});
   EarlierPartners partners({0, 0, 0, 0, 1, 1, 1, 2}, 1);
   // Two seeds, one in each session.
-  EXPECT_THAT(partners.Seeds(ranking, 2, 0), ElementsAre(Pair(0, 7), Pair(4, 7)));
+  EXPECT_THAT(Seeds(ranking, 2, 0, &partners), ElementsAre(Pair(0, 7), Pair(4, 7)));
   // Now session 1 has two, as many as are chosen.
   EXPECT_THAT(partners.Choose({{{5, 7}, 90}}), IsEmpty());
   // Session 1 has three with the one that was not chosen; of one more, session 0 has fewer when 1 was served.
@@ -108,10 +122,10 @@ TEST(EarlierPartners, SessionsCountAndNotTheOrderOfImages) {
   //   session    2 1 0 0        image 0 is of the last session
   //   image      0 1 2 3
   EarlierPartners partners({2, 1, 0, 0}, 1);
-  OverlapRanking ranking(4);
+  Ranking ranking(4);
   ranking[0] = Ranked({3, 1});
   ranking[1] = Ranked({0});
-  EXPECT_THAT(partners.Seeds(ranking, 1, 0), ElementsAre(Pair(0, 1)));
+  EXPECT_THAT(Seeds(ranking, 1, 0, &partners), ElementsAre(Pair(0, 1)));
   EXPECT_THAT(partners.Choose({{{0, 2}, 30}, {{0, 3}, 40}, {{1, 2}, 30}}),
               ElementsAre(Pair(0, 3), Pair(1, 2)));
 }

@@ -9,8 +9,8 @@ namespace cairn::match_features {
 namespace {
 
 // The first of every session, the latest session first, then the second of every session, ...
-std::vector<OverlapPartner> TakeInTurns(const std::map<int, std::vector<OverlapPartner>>& by_session) {
-  std::vector<OverlapPartner> in_turns;
+std::vector<int> TakeInTurns(const std::map<int, std::vector<int>>& by_session) {
+  std::vector<int> in_turns;
   for (size_t rank = 0, num_before = 1; num_before > 0; ++rank) {
     num_before = 0;
     for (auto session = by_session.rbegin(); session != by_session.rend(); ++session) {
@@ -32,21 +32,29 @@ std::pair<int, int> LaterFirst(const std::pair<int, int>& pair, const std::vecto
 EarlierPartners::EarlierPartners(std::vector<int> session_of_image, double ratio)
     : session_(std::move(session_of_image)), ratio_(ratio), partners_(session_.size()) {}
 
-IndexPairs EarlierPartners::Seeds(const OverlapRanking& ranking, int num_best, int num_spread) {
-  OverlapRanking within(ranking.size()), earlier(ranking.size());
-  for (int idx = 0; idx < static_cast<int>(ranking.size()); ++idx) {
-    std::map<int, std::vector<OverlapPartner>> by_session;
-    for (const OverlapPartner& partner : ranking[idx]) {
-      if (Generation(partner.idx) == Generation(idx)) {
-        within[idx].push_back(partner);
-      } else if (session_[partner.idx] < session_[idx]) {
-        by_session[session_[partner.idx]].push_back(partner);
-      }
+EarlierPartners::Seeds EarlierPartners::SeedsOf(int idx, const std::vector<OverlapPartner>& ranked,
+                                                int num_best, int num_spread) const {
+  std::vector<int> within;
+  std::map<int, std::vector<int>> by_session;
+  for (const OverlapPartner& partner : ranked) {
+    if (Generation(partner.idx) == Generation(idx)) {
+      within.push_back(partner.idx);
+    } else if (session_[partner.idx] < session_[idx]) {
+      by_session[session_[partner.idx]].push_back(partner.idx);
     }
-    earlier[idx] = TakeInTurns(by_session);
   }
-  IndexPairs pairs = FrustumSeeds(within, num_best, num_spread);
-  const IndexPairs with_earlier = FrustumSeeds(earlier, num_best, num_spread);
+  return {SeedsAmong(within, num_best, num_spread),
+          SeedsAmong(TakeInTurns(by_session), num_best, num_spread)};
+}
+
+IndexPairs EarlierPartners::TakeSeeds(const std::vector<Seeds>& seeds) {
+  std::vector<std::vector<int>> within, earlier;
+  for (const Seeds& of_image : seeds) {
+    within.push_back(of_image.within);
+    earlier.push_back(of_image.earlier);
+  }
+  IndexPairs pairs = PairsFromPartners(within);
+  const IndexPairs with_earlier = PairsFromPartners(earlier);
   for (const auto& pair : with_earlier) {
     const auto [idx, partner] = LaterFirst(pair, session_);
     Partners& partners = partners_[idx][session_[partner]];

@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "stages/match_features/pairs/frustum_overlap.h"
 #include "stages/match_features/pairs/predict_pairs.h"
 #include "stages/match_features/pairs/select_pairs.h"
 
@@ -28,9 +29,16 @@ class EarlierPartners {
   // REQUIRES: sessions >= 0, ratio >= 0
   EarlierPartners(std::vector<int> session_of_image, double ratio);
 
-  // FrustumSeeds of each image within its generation, and as many again with earlier ones: the ranks are then
-  // those of the sessions in turns, the latest first.  To be called once, before Choose.
-  IndexPairs Seeds(const OverlapRanking& ranking, int num_best, int num_spread);
+  // Images that an image is matched with at first, by the ranks of the overlaps.
+  struct Seeds {
+    std::vector<int> within;   // its generation
+    std::vector<int> earlier;  // sessions
+  };
+  // SeedsAmong those of an image's generation, and as many again of earlier sessions: the ranks are then
+  // those of the sessions in turns, the latest first.
+  Seeds SeedsOf(int idx, const std::vector<OverlapPartner>& ranked, int num_best, int num_spread) const;
+  // The pairs of the seeds of all images, ascending.  To be called once, before Choose.
+  IndexPairs TakeSeeds(const std::vector<Seeds>& seeds);
 
   // Those of the predicted pairs that are to be matched, ascending.  An image's next partner in an earlier
   // session is in that of which it has the fewest so far, of equal ones the latest, and the one of the most

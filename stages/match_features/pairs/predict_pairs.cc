@@ -14,189 +14,195 @@
 namespace cairn::match_features {
 namespace {
 
-// Moves whole[begin, end) back by as many as stand before `added_begin`, and puts added[added_begin,
-// added_end) after it.
-template <typename T>
-void MoveAndInsert(uint64_t begin, uint64_t end, const std::vector<T>& added, uint64_t added_begin,
-                   uint64_t added_end, std::vector<T>* whole) {
-  T* const moved_end = whole->data() + end + added_begin;
-  std::move_backward(whole->data() + begin, whole->data() + end, moved_end);
-  std::copy(added.data() + added_begin, added.data() + added_end, moved_end);
-}
+// Parts of the memory: of rays and of matches that are kept, and of those that Predict() looks at.
+constexpr int64_t kKeptPart = 16, kNearPart = 2;
 
-}  // namespace
+// A ray of a view.
+struct ViewRay {
+  const Eigen::Vector3d& center;
+  double focal_px;
+  const Eigen::Vector3f& ray;
+};
 
-PairPredictor::PairPredictor(std::vector<View> views) : views_(std::move(views)) {
-  first_feature_.push_back(0);
-  for (size_t idx = 0; idx < views_.size(); ++idx) {
-    view_of_.insert(view_of_.end(), views_[idx].rays.size(), static_cast<int>(idx));
-    first_feature_.push_back(static_cast<uint32_t>(view_of_.size()));
-  }
-}
-
-void PairPredictor::Add(int idx1, int idx2, const std::vector<Match>& inliers) {
-  for (const Match& match : inliers)
-    matches_.emplace_back(first_feature_[idx1] + match.idx1, first_feature_[idx2] + match.idx2);
-}
-
-PairPredictor::Links PairPredictor::CollectLinks(size_t first_match) const {
-  Links links;
-  links.begin.resize(view_of_.size() + 2, 0);
-  const std::span matches = std::span(matches_).subspan(first_match - num_forgotten_);
-  for (const auto& [f, h] : matches) {
-    ++links.begin[f + 2];
-    ++links.begin[h + 2];
-  }
-  for (size_t f = 2; f < links.begin.size(); ++f) links.begin[f] += links.begin[f - 1];
-  links.feature.resize(2 * matches.size());
-  for (const auto& [f, h] : matches) {
-    links.feature[links.begin[f + 1]++] = h;
-    links.feature[links.begin[h + 1]++] = f;
-  }
-  return links;
-}
-
-bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const {
-  const View &view1 = views_[view_of_[feature1]], &view2 = views_[view_of_[feature2]];
-  const Eigen::Vector3d ray1 = Ray(feature1).cast<double>(), ray2 = Ray(feature2).cast<double>();
-  const Eigen::Vector3d baseline = view2.center - view1.center;
-  const double tolerance_rad = options.max_prior_error_px / (0.5 * (view1.focal_px + view2.focal_px));
+bool CanMeet(const ViewRay& a, const ViewRay& b, const PredictPairsOptions& options) {
+  const Eigen::Vector3d ray1 = a.ray.cast<double>(), ray2 = b.ray.cast<double>();
+  const Eigen::Vector3d baseline = b.center - a.center;
+  const double tolerance_rad = options.max_prior_error_px / (0.5 * (a.focal_px + b.focal_px));
   if (baseline.norm() < options.min_baseline_m) return (ray1 - ray2).norm() <= tolerance_rad;
   return SquaredSampsonError(CrossMatrix(baseline), ray1, ray2) <= tolerance_rad * tolerance_rad &&
          RaysConverge(ray1, ray2, baseline, tolerance_rad);
 }
 
-void PairPredictor::LinkAll() {
-  Links added = CollectLinks(num_linked_);
-  num_linked_ = num_matches();
-  if (links_.feature.empty()) {
-    links_ = std::move(added);
-    return;
-  }
-  // From the last feature on, so that nothing is overwritten that is still to be moved.
-  links_.feature.reserve(links_.feature.size() + added.feature.size());  // no more than that
-  links_.feature.resize(links_.feature.size() + added.feature.size());
-  for (size_t f = view_of_.size(); f-- > 0;) {
-    const uint64_t begin = links_.begin[f], end = links_.begin[f + 1];
-    const uint64_t added_begin = added.begin[f], added_end = added.begin[f + 1];
-    MoveAndInsert(begin, end, added.feature, added_begin, added_end, &links_.feature);
-  }
-  for (size_t f = 0; f < links_.begin.size(); ++f) links_.begin[f] += added.begin[f];
+void Prefetch(std::span<const Neighbourhood::Link> links) {
+  constexpr size_t kLineBytes = 64;
+  for (size_t i = 0; i < links.size(); i += kLineBytes / sizeof(Neighbourhood::Link))
+    __builtin_prefetch(links.data() + i);
 }
 
-std::vector<char> PairPredictor::ImagesToExamine(const std::set<int>& without) const {
-  const bool is_first = num_predicted_from_ == 0;
+}  // namespace
+
+PairPredictor::PairPredictor(const std::string& beside, int64_t max_num_bytes)
+    : matched_(beside, max_num_bytes / kKeptPart), max_num_bytes_(max_num_bytes) {}
+
+void PairPredictor::AddView(const View& view) {
+  places_.push_back({view.center, view.focal_px, view.generation});
+  matched_.AddView(view.rays);
+}
+
+void PairPredictor::Add(int idx1, int idx2, const std::vector<Match>& inliers) {
+  if (!inliers.empty()) matched_.AddPair(idx1, idx2, inliers);
+}
+
+std::vector<int> PairPredictor::ImagesToExamine(const std::set<int>& without) const {
+  const std::vector<MatchedRays::Pair>& pairs = matched_.pairs();
   int first_changed = std::numeric_limits<int>::max();
-  for (size_t i = num_predicted_from_ - num_forgotten_; i < matches_.size(); ++i) {
-    const auto& [f, h] = matches_[i];
-    first_changed =
-        std::min(first_changed, std::max(views_[view_of_[f]].generation, views_[view_of_[h]].generation));
+  for (size_t i = num_predicted_from_; i < pairs.size(); ++i) {
+    first_changed = std::min(
+        first_changed, std::max(places_[pairs[i].view1].generation, places_[pairs[i].view2].generation));
   }
-  std::vector<char> to_examine;
-  for (const View& view : views_)
-    to_examine.push_back(
-        !without.contains(view.generation) && (is_first || view.generation >= first_changed) ? 1 : 0);
-  return to_examine;
+  std::vector<int> images;
+  for (int idx = 0; idx < matched_.num_views(); ++idx) {
+    const int generation = places_[idx].generation;
+    if (generation >= first_changed && !without.contains(generation)) images.push_back(idx);
+  }
+  return images;
 }
 
-std::vector<char> PairPredictor::NewlyLinked(int idx, const Links& new_links) const {
-  std::vector<char> linked(views_.size(), 0);
-  const auto follow = [&](uint32_t f, const Links& first, const Links& second) {
-    for (uint64_t i = first.begin[f]; i < first.begin[f + 1]; ++i) {
-      const uint32_t middle = first.feature[i];
-      if (views_[view_of_[middle]].generation > views_[idx].generation) continue;
-      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k)
-        linked[view_of_[second.feature[k]]] = 1;
-    }
+template <typename Visit>
+void PairPredictor::VisitChains(int idx, bool only_new, const Neighbourhood& near, const Visit& visit) const {
+  const Neighbourhood::LinkedView& from = near.At(near.SlotOf(idx));
+  struct Ends {
+    bool is_new;
+    std::span<const Neighbourhood::Link> links;
   };
-  for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
-    follow(f, new_links, links_);
-    follow(f, links_, new_links);
+  constexpr size_t kAhead = 3;
+  std::vector<Ends> ends;
+  for (uint32_t f = 0; f < from.rays.size(); ++f) {
+    ends.clear();
+    for (const Neighbourhood::Link& middle : from.LinksOf(f)) {
+      const Neighbourhood::LinkedView& to = near.At(middle.slot);
+      const bool is_new = middle.is_new != 0;
+      if (IsLater(near.ViewOf(middle.slot), idx)) continue;
+      if (!only_new || is_new || to.has_new_link[middle.feature] != 0)
+        ends.push_back({is_new, to.LinksOf(middle.feature)});
+    }
+    for (size_t k = 0; k < ends.size(); ++k) {
+      // Links of one feature after the other are far from each other: most of the time is spent on waiting.
+      if (k + kAhead < ends.size()) Prefetch(ends[k + kAhead].links);
+      for (const Neighbourhood::Link& end : ends[k].links) visit(f, ends[k].is_new || end.is_new != 0, end);
+    }
   }
+}
+
+std::vector<char> PairPredictor::NewlyLinked(int idx, const Neighbourhood& near) const {
+  std::vector<char> linked(near.num_slots(), 0);
+  VisitChains(idx, true, near, [&](uint32_t /*f*/, bool is_new, const Neighbourhood::Link& end) {
+    linked[end.slot] |= static_cast<char>(is_new);
+  });
   return linked;
 }
 
 std::vector<int> PairPredictor::ExpectedMatches(int idx, const std::vector<char>& settled,
+                                                const Neighbourhood& near,
                                                 const PredictPairsOptions& options) const {
   const auto min_cosine = static_cast<float>(std::cos(RadFromDeg(options.max_ray_angle_deg)));
-  std::vector<int> expected(views_.size(), 0);
+  const Neighbourhood::LinkedView& from = near.At(near.SlotOf(idx));
+  std::vector<int> expected(near.num_slots(), 0);
   // The matches of a pair are the features of its first image that have one: where that is not this one,
-  // which they are.  Of this one: the last feature that counted, plus one.
-  std::vector<uint32_t> counted(views_.size(), 0);
-  std::vector<bool> is_counted(idx > 0 ? first_feature_[idx] : 0);
-  for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
-    const Eigen::Vector3f& ray = Ray(f);
-    for (uint64_t i = links_.begin[f]; i < links_.begin[f + 1]; ++i) {
-      const uint32_t middle = links_.feature[i];
-      if (views_[view_of_[middle]].generation > views_[idx].generation) continue;
-      for (uint64_t k = links_.begin[middle]; k < links_.begin[middle + 1]; ++k) {
-        const uint32_t h = links_.feature[k];
-        const int other = view_of_[h];
-        if (settled[other] || counted[other] == f + 1) continue;
-        const bool is_first = idx < other;
-        if (!is_first && is_counted[h]) continue;
-        if (ray.dot(Ray(h)) < min_cosine) continue;
-        if (!(is_first ? CanMeet(f, h, options) : CanMeet(h, f, options))) continue;
-        if (is_first) {
-          counted[other] = f + 1;
-        } else {
-          is_counted[h] = true;
-        }
-        ++expected[other];
-      }
+  // which they are, flags for all features of the images before it.  Of this one: the last feature that
+  // counted, plus one; of images that are settled more than any.
+  std::vector<uint32_t> counted(near.num_slots(), 0);
+  std::vector<uint32_t> first_flag(near.num_slots());
+  uint32_t num_flags = 0;
+  for (int slot = 0; slot < near.num_slots(); ++slot) {
+    if (settled[slot] != 0) {
+      counted[slot] = std::numeric_limits<uint32_t>::max();
+    } else if (near.ViewOf(slot) < idx) {
+      first_flag[slot] = num_flags;
+      num_flags += matched_.NumFeatures(near.ViewOf(slot));
     }
   }
+  std::vector<bool> is_counted(num_flags);
+  const auto ray_of = [&](int view, const Eigen::Vector3f& ray) {
+    return ViewRay{places_[view].center, places_[view].focal_px, ray};
+  };
+  VisitChains(idx, false, near, [&](uint32_t f, bool /*is_new*/, const Neighbourhood::Link& end) {
+    if (counted[end.slot] > f) return;
+    const int other = near.ViewOf(end.slot);
+    const bool is_first = idx < other;
+    const uint32_t flag = first_flag[end.slot] + end.feature;
+    if (!is_first && is_counted[flag]) return;
+    const ViewRay here = ray_of(idx, from.rays[f]);
+    const ViewRay there = ray_of(other, near.At(end.slot).rays[end.feature]);
+    if (here.ray.dot(there.ray) < min_cosine) return;
+    if (!(is_first ? CanMeet(here, there, options) : CanMeet(there, here, options))) return;
+    if (is_first) {
+      counted[end.slot] = f + 1;
+    } else {
+      is_counted[flag] = true;
+    }
+    ++expected[end.slot];
+  });
   return expected;
+}
+
+std::vector<PredictedPair> PairPredictor::PredictFrom(int idx, const std::vector<int>& known,
+                                                      const Neighbourhood& near,
+                                                      const PredictPairsOptions& options) const {
+  std::vector<char> settled(near.num_slots(), 0);
+  if (num_predicted_from_ > 0) {
+    settled = NewlyLinked(idx, near);
+    for (char& flag : settled) flag = flag == 0;
+  }
+  for (int slot = 0; slot < near.num_slots(); ++slot) {
+    const int other = near.ViewOf(slot);
+    if (other < 0 || !IsFrom(idx, other) || std::binary_search(known.begin(), known.end(), other))
+      settled[slot] = 1;
+  }
+  std::vector<PredictedPair> predicted;
+  if (std::find(settled.begin(), settled.end(), 0) == settled.end()) return predicted;
+  const std::vector<int> expected = ExpectedMatches(idx, settled, near, options);
+  for (int slot = 0; slot < near.num_slots(); ++slot) {
+    if (expected[slot] >= options.min_num_expected_matches)
+      predicted.push_back({std::minmax(idx, near.ViewOf(slot)), expected[slot]});
+  }
+  return predicted;
 }
 
 Result<std::vector<PredictedPair>> PairPredictor::Predict(const IndexPairs& known,
                                                           const PredictPairsOptions& options, int num_threads,
                                                           Progress& progress, const std::set<int>& without) {
-  const int num_views = static_cast<int>(views_.size());
-  const std::vector<char> to_examine = ImagesToExamine(without);
+  CAIRN_RETURN_IF_ERROR(matched_.status());
   std::vector<PredictedPair> pairs;
-  const bool is_first = num_predicted_from_ == 0;
-  if (std::find(to_examine.begin(), to_examine.end(), 1) == to_examine.end()) {
-    num_predicted_from_ = num_matches();
+  const size_t num_pairs = matched_.pairs().size();
+  std::vector<int> images = ImagesToExamine(without);
+  if (images.empty()) {
+    num_predicted_from_ = num_pairs;
     return pairs;
   }
-  LinkAll();
-  const Links new_links = is_first ? Links() : CollectLinks(num_predicted_from_);
-  num_forgotten_ = num_matches();
-  std::vector<std::pair<uint32_t, uint32_t>>().swap(matches_);
-  std::vector<std::vector<int>> known_from(views_.size());
+  Neighbourhood near(matched_, num_predicted_from_, max_num_bytes_ / kNearPart);
+  std::erase_if(images, [&](int idx) { return !near.HasNewChain(idx); });
+  std::vector<std::vector<int>> known_from(places_.size());  // ascending
   for (const auto& [idx1, idx2] : known) {
     const bool is_from_first = IsFrom(idx1, idx2);
     known_from[is_from_first ? idx1 : idx2].push_back(is_from_first ? idx2 : idx1);
   }
-  std::vector<std::vector<PredictedPair>> predicted(views_.size());
-  progress.Begin("predict pairs", num_views, "images");
-  ParallelFor(num_views, num_threads, [&](int64_t i) {
-    if (progress.Cancelled()) return;
-    const int idx = static_cast<int>(i);
-    progress.Advance();
-    if (to_examine[idx] == 0) return;
-    std::vector<char> settled(views_.size(), 0);
-    if (!is_first) {
-      settled = NewlyLinked(idx, new_links);
-      for (char& flag : settled) flag = flag == 0;
-    }
-    for (int other = 0; other < num_views; ++other) {
-      if (!IsFrom(idx, other)) settled[other] = 1;
-    }
-    for (const int other : known_from[idx]) settled[other] = 1;
-    if (std::find(settled.begin(), settled.end(), 0) == settled.end()) return;
-    const std::vector<int> expected = ExpectedMatches(idx, settled, options);
-    for (int other = 0; other < num_views; ++other) {
-      if (expected[other] >= options.min_num_expected_matches)
-        predicted[i].push_back({std::minmax(idx, other), expected[other]});
-    }
-  });
+  progress.Begin("predict pairs", static_cast<int64_t>(images.size()), "images");
+  for (size_t begin = 0, end = 0; begin < images.size() && !progress.Cancelled(); begin = end) {
+    CAIRN_ASSIGN_OR_RETURN(end, near.MoveTo(images, begin, num_threads));
+    std::vector<std::vector<PredictedPair>> predicted(end - begin);
+    ParallelFor(static_cast<int64_t>(end - begin), num_threads, [&](int64_t i) {
+      if (progress.Cancelled()) return;
+      const int idx = images[begin + i];
+      predicted[i] = PredictFrom(idx, known_from[idx], near, options);
+      progress.Advance();
+    });
+    for (const std::vector<PredictedPair>& part : predicted)
+      pairs.insert(pairs.end(), part.begin(), part.end());
+  }
   progress.End();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while predicting pairs");
-  num_predicted_from_ = num_matches();
-  for (const std::vector<PredictedPair>& part : predicted)
-    pairs.insert(pairs.end(), part.begin(), part.end());
+  num_predicted_from_ = num_pairs;
   std::sort(pairs.begin(), pairs.end(),
             [](const PredictedPair& a, const PredictedPair& b) { return a.idxs < b.idxs; });
   return pairs;

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -9,6 +12,8 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/features/features.h"
+#include "stages/match_features/pairs/matched_rays.h"
+#include "stages/match_features/pairs/neighbourhood.h"
 #include "stages/match_features/pairs/select_pairs.h"
 
 namespace cairn::match_features {
@@ -48,63 +53,59 @@ class PairPredictor {
     double focal_px = 0;
     int generation = 0;
   };
-  explicit PairPredictor(std::vector<View> views);
+  // Of rays and of matches a sixteenth of `max_num_bytes` each is in memory, the others in a file without a
+  // name, made where `beside` is.
+  PairPredictor(const std::string& beside, int64_t max_num_bytes);
 
+  // The next view; all are added before the first matches.
+  void AddView(const View& view);
   // Adds the verified matches of two views.
   void Add(int idx1, int idx2, const std::vector<Match>& inliers);
 
   // Pairs (ascending) of enough expected matches that are not in `known` (ascending), without those of the
   // generations in `without`: what they predict is known from elsewhere.  Same for any order of
-  // the calls of Add and any number of threads.  A later call only examines pairs that matches added since
-  // the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls have the same
-  // options, and the pairs of earlier calls in `known`.  Cost: sum over the features of the generations that
-  // are looked for of (matches)^2; later, of images with such pairs.  Memory: 8 bytes per match, and for a
-  // moment another 8, and 8 to 24 for each since the last call; 28 per feature.  Errors: Cancelled.
+  // the calls of Add, any number of threads and any memory.  A later call only examines pairs that matches
+  // added since the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls
+  // have the same options, and the pairs of earlier calls in `known`.  Cost: sum over the features of the
+  // generations that are looked for of (matches)^2; later, of images with such pairs.  Memory: half of
+  // max_num_bytes for features and matches, but what an image needs and those that it matches, and what they
+  // match; about 40 bytes per pair.  Errors: Cancelled; ReadOnly, DiskFull, Io (the files).
   Result<std::vector<PredictedPair>> Predict(const IndexPairs& known, const PredictPairsOptions& options,
                                              int num_threads, Progress& progress,
                                              const std::set<int>& without = {});
 
  private:
-  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
-  struct Links {
-    std::vector<uint64_t> begin;
-    std::vector<uint32_t> feature;
+  struct Place {
+    Eigen::Vector3d center;
+    double focal_px;
+    int generation;
   };
-  // That were added.
-  size_t num_matches() const { return num_forgotten_ + matches_.size(); }
-  // Links of the matches from `first_match` on.
-  Links CollectLinks(size_t first_match) const;
-  // All matches that were added are linked.
-  void LinkAll();
-  // Per image, whether it has pairs to look for: those of its generation are asked for, and matches of it or
-  // of earlier ones were added since the last call.
-  std::vector<char> ImagesToExamine(const std::set<int>& without) const;
+  // Images that have pairs to look for, ascending: those of their generation are asked for, and matches of it
+  // or of earlier ones were added since the last call.
+  std::vector<int> ImagesToExamine(const std::set<int>& without) const;
   // Whether the pair is looked for from `idx`.
   bool IsFrom(int idx, int other) const {
-    const int generation = views_[idx].generation, other_generation = views_[other].generation;
+    const int generation = places_[idx].generation, other_generation = places_[other].generation;
     return generation != other_generation ? generation > other_generation : idx < other;
   }
-  // Images to which a chain leads that has a match of `new_links`, flags per image.
-  std::vector<char> NewlyLinked(int idx, const Links& new_links) const;
-  // Expected matches with every image that is not in `settled`, flags per image.
-  std::vector<int> ExpectedMatches(int idx, const std::vector<char>& settled,
+  bool IsLater(int idx, int than) const { return places_[idx].generation > places_[than].generation; }
+  // Calls visit(feature, whether one of its matches is new, its end) for the chains that begin in the image,
+  // by ascending features.  `only_new`: those without a new match may be left out.
+  template <typename Visit>
+  void VisitChains(int idx, bool only_new, const Neighbourhood& near, const Visit& visit) const;
+  // Images to which a chain leads that has a new match, flags by slot.
+  std::vector<char> NewlyLinked(int idx, const Neighbourhood& near) const;
+  // Expected matches with every image that is not in `settled`, both by slot.
+  std::vector<int> ExpectedMatches(int idx, const std::vector<char>& settled, const Neighbourhood& near,
                                    const PredictPairsOptions& options) const;
-  bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
-  const Eigen::Vector3f& Ray(uint32_t feature) const {
-    const int idx = view_of_[feature];
-    return views_[idx].rays[feature - first_feature_[idx]];
-  }
+  // The pairs to be looked for from `idx`, without those with `known`.
+  std::vector<PredictedPair> PredictFrom(int idx, const std::vector<int>& known, const Neighbourhood& near,
+                                         const PredictPairsOptions& options) const;
 
-  std::vector<View> views_;
-  std::vector<uint32_t> first_feature_;  // of each view, counted over all; one more than views
-  std::vector<int> view_of_;             // of each feature
-  // Matches in the order in which they were added: those that are linked, and that a call of Predict() has
-  // seen, are forgotten.
-  std::vector<std::pair<uint32_t, uint32_t>> matches_;
-  size_t num_forgotten_ = 0;
-  Links links_;                    // of the first matches
-  size_t num_linked_ = 0;          // so many
-  size_t num_predicted_from_ = 0;  // matches that were there at the last call of Predict
+  std::vector<Place> places_;  // of each view
+  MatchedRays matched_;
+  int64_t max_num_bytes_;
+  size_t num_predicted_from_ = 0;  // pairs that were there at the last call of Predict
 };
 
 }  // namespace cairn::match_features
