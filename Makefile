@@ -26,7 +26,7 @@ PACKAGES_TEST := $(PACKAGES_MORE) $(LIBRARIES_TEST) sqlite3 ffmpeg \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
     python3-rosbag python3-nav-msgs python3-tf2-msgs \
-    debhelper dh-python lintian debootstrap clang libclang-rt-14-dev clang-format clang-tidy
+    debhelper dh-python lintian debootstrap gnupg clang libclang-rt-14-dev clang-format clang-tidy
 # Another architecture: its compiler, an emulator, and what fetches its packages.
 PACKAGES_CROSS := g++-aarch64-linux-gnu qemu-user-static mmdebstrap fakechroot
 # Optional: the demo's picture as PNG; for tests of the kernels of other processors, an emulation of Intel's instructions and
@@ -38,7 +38,7 @@ PACKAGES_SYSROOT := libc6-dev $(LIBRARIES) $(PACKAGES_PYTHON) $(LIBRARIES_TEST)
 SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all help program whole deps deps-all demo tables test test-arm64 bench reproduce maps compile install deb sysroot sysroot-packages format format-check tidy docs clean
+.PHONY: all help program whole deps deps-all demo tables test test-arm64 bench reproduce maps compile install deb release sysroot sysroot-packages format format-check tidy docs clean
 # Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
@@ -107,6 +107,9 @@ install: whole  ## Install program, library, headers, Python module and manual u
 
 deb: deps-all  ## Build the Debian packages into build/deb; those for another machine with ARCH=arm64
 	@scripts/build_packages build/deb $(ARCH)
+
+release: deps-all  ## Make a release of the commit in build/dist: source, packages, apt folder; VERSION=X.Y.Z KEY=GPG_KEY MAINTAINER='NAME <MAIL>' ARCHES=arm64
+	@KEY='$(KEY)' MAINTAINER='$(MAINTAINER)' ARCHES='$(ARCHES)' scripts/make_release build/dist $(VERSION)
 
 sysroot:  ## Unpack Debian's libraries for arm64 into build/sysroot/arm64, for cmake/arm64.cmake
 	@scripts/make_sysroot arm64 build/sysroot/arm64 $(PACKAGES_SYSROOT)
