@@ -1,8 +1,11 @@
 #include "stages/group_classes/command.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/capture/sessions.h"
@@ -13,8 +16,19 @@
 namespace cairn::group_classes {
 namespace {
 
-// Bytes of memory per byte of the input file, where all poses are adjusted together and where none is.
+// Bytes of memory per byte of the input file, where all poses are adjusted together and where none is; there
+// no more than a part of a large file's is in memory at once (bench/scale/README.md).
 constexpr double kMemoryPerFileByte = 1.6, kMemoryPerFileByteUnadjusted = 0.8;
+constexpr double kFixedMemoryUnadjusted = 600.0 * (1 << 20), kMemoryPerLargeFileByteUnadjusted = 0.15;
+
+double MemoryPerFileByte(const std::string& matches, bool may_adjust) {
+  if (may_adjust) return kMemoryPerFileByte;
+  std::error_code error;
+  const auto num_bytes = static_cast<double>(std::filesystem::file_size(matches, error));
+  if (error || num_bytes == 0) return kMemoryPerFileByteUnadjusted;  // its reader says what is wrong
+  return std::min(kMemoryPerFileByteUnadjusted,
+                  kMemoryPerLargeFileByteUnadjusted + kFixedMemoryUnadjusted / num_bytes);
+}
 
 struct Arguments {
   std::string matches;
@@ -115,9 +129,17 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   const bool may_adjust = arguments.options.refine_poses != "never";
-  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches,
-                                           may_adjust ? kMemoryPerFileByte : kMemoryPerFileByteUnadjusted,
-                                           environment.memory_mib));
+  Status fits = CheckMemoryForFile("grouping the matches", arguments.matches,
+                                   MemoryPerFileByte(arguments.matches, may_adjust), environment.memory_mib);
+  if (!fits.ok() && may_adjust &&
+      CheckMemoryForFile("", arguments.matches, MemoryPerFileByte(arguments.matches, false),
+                         environment.memory_mib)
+          .ok()) {
+    return MakeError(fits.error().code,
+                     "{}; most of it is for adjusting poses: with --refine-poses never it fits",
+                     fits.error().message);
+  }
+  CAIRN_RETURN_IF_ERROR(std::move(fits));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
   // A reconstruction refines the database's cameras, with the same numbers, along with the poses.  Of
   // panoramas the database has views.

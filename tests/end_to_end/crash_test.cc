@@ -383,4 +383,22 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
 }
 
 }  // namespace
+TEST(Memory, GroupingThatFitsWithoutAdjustingPosesSaysSo) {
+  TemporaryFolder folder("grouping_memory_test");
+  fs::create_directories(folder / "work");
+  const Workplace workplace(folder / "work");
+  // Between what is needed without and with adjusting: 0.8 and 1.6 bytes per byte beside the program's 64
+  // MiB.
+  const auto memory_mib =
+      static_cast<int>(64 + (fs::file_size(workplace.Build("matches.db")) * 1.2) / (1 << 20));
+  const std::string command =
+      fmt::format("cairn stage group-classes {} --capture {} -o {} --memory {}",
+                  workplace.Build("matches.db"), workplace.Build("capture"), folder / "out", memory_mib);
+  const ProgramRun refused = RunShell(command);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("with --refine-poses never it fits"));
+  const ProgramRun grouped = RunShell(command + " --refine-poses never");
+  EXPECT_EQ(grouped.exit_code, 0) << grouped.err;
+}
+
 }  // namespace cairn
