@@ -15,14 +15,25 @@ mkdir -p "$folder"
 folder=$(realpath "$folder")
 fail() { echo "$*" >&2; exit 1; }
 
-# The sources as they are, a commit.
+# The sources as they are, a repository of two commits.
+list_sources() {
+  if [[ $(git -C "$sources" rev-parse --show-toplevel 2> /dev/null) == "$(realpath "$sources")" ]]; then
+    git -C "$sources" ls-files -z --cached --others --exclude-standard
+  else
+    (cd "$sources" && find . -path ./build -prune -o -path ./.git -prune -o -type f -print0)
+  fi
+}
 snapshot() {  # FOLDER
-  git clone -q --no-hardlinks "$sources" "$1"
-  git -C "$sources" ls-files -z --cached --others --exclude-standard |
-    (cd "$sources" && while IFS= read -r -d '' file; do [[ ! -e $file ]] || printf '%s\0' "$file"; done | tar --null -T - -cf -) | tar -x -C "$1"
+  mkdir -p "$1"
+  git init -q "$1"
+  list_sources | (cd "$sources" && while IFS= read -r -d '' file; do [[ ! -e $file ]] || printf '%s\0' "$file"; done | tar --null -T - -cf -) |
+    tar -x -C "$1"
+  commit() {
+    GIT_AUTHOR_DATE=@1795824000 GIT_COMMITTER_DATE=@1795824000 git -C "$1" -c user.name=Test -c user.email=test@cairn.example commit -q "${@:2}"
+  }
   git -C "$1" add -A
-  GIT_AUTHOR_DATE=@1795824000 GIT_COMMITTER_DATE=@1795824000 git -C "$1" -c user.name=Test -c user.email=test@cairn.example \
-    commit -q --allow-empty -m "What is tested, and this line is so long that the changelog has to break it into two"
+  commit "$1" -m "All before"
+  commit "$1" --allow-empty -m "What is tested, and this line is so long that the changelog has to break it into two"
 }
 GNUPGHOME=$(mktemp -d)
 export GNUPGHOME
@@ -35,7 +46,6 @@ release() {  # CHECKOUT FOLDER [VERSION]
 }
 
 # Twice, with other folders, times, umasks and time zones: the same bytes, but of signatures and what names them.
-git -C "$sources" rev-parse --git-dir > /dev/null || fail "$sources is no git checkout"
 snapshot "$folder/sources"
 (umask 077 && snapshot "$folder/elsewhere/and/deeper")
 version=$(cd "$sources" && dpkg-parsechangelog -S Version)
