@@ -1,7 +1,6 @@
 #include "core/line/memory.h"
 
 #include <malloc.h>
-
 #include <unistd.h>
 
 #include <algorithm>
@@ -59,6 +58,12 @@ int64_t DefaultMemoryMib() {
   return std::max<int64_t>(1, std::min(machine, ControlGroupLimit()) / 5 * 4 >> 20);
 }
 
+void ReturnFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mib) {
   const int64_t needed_mib = (num_bytes + kProgramBytes + (int64_t{1} << 20) - 1) >> 20;
   if (needed_mib <= memory_mib) return Ok();
@@ -66,12 +71,6 @@ Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mi
       ErrorCode::kFailed,
       "{} takes about {} MiB of memory, but --memory allows {} MiB; allow more, or use a larger machine",
       work, needed_mib, memory_mib);
-}
-
-void ReturnFreedMemory() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
 }
 
 Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,

@@ -17,6 +17,8 @@ class PointGrid {
     for (size_t i = 0; i < points.size(); ++i) cells_[CellOf(points[i])].push_back(static_cast<int>(i));
   }
 
+  PointGrid(const std::vector<Eigen::Vector3d>&& points, double side) = delete;
+
   // Calls visit(index, distance) for all points within the side of a place.
   template <typename Visit>
   void ForNear(const Eigen::Vector3d& place, const Visit& visit) const {

@@ -16,18 +16,9 @@ folder=$(realpath "$folder")
 fail() { echo "$*" >&2; exit 1; }
 
 # The sources as they are, a repository of two commits.
-list_sources() {
-  if [[ $(git -C "$sources" rev-parse --show-toplevel 2> /dev/null) == "$(realpath "$sources")" ]]; then
-    git -C "$sources" ls-files -z --cached --others --exclude-standard
-  else
-    (cd "$sources" && find . -path ./build -prune -o -path ./.git -prune -o -type f -print0)
-  fi
-}
 snapshot() {  # FOLDER
-  mkdir -p "$1"
+  "$sources/scripts/copy_sources" "$1"
   git init -q "$1"
-  list_sources | (cd "$sources" && while IFS= read -r -d '' file; do [[ ! -e $file ]] || printf '%s\0' "$file"; done | tar --null -T - -cf -) |
-    tar -x -C "$1"
   commit() {
     GIT_AUTHOR_DATE=@1795824000 GIT_COMMITTER_DATE=@1795824000 git -C "$1" -c user.name=Test -c user.email=test@cairn.example commit -q "${@:2}"
   }

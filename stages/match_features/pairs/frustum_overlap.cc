@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numbers>
 #include <tuple>
 #include <utility>
 
@@ -40,7 +41,8 @@ double ConeSquare(const Camera& camera) {
   double largest_rad = 0;
   const auto look = [&](double x, double y) {
     const auto bearing = BearingFromImage(camera, {x, y});
-    largest_rad = std::max(largest_rad, bearing ? std::acos(std::clamp(bearing->z(), -1.0, 1.0)) : M_PI);
+    largest_rad =
+        std::max(largest_rad, bearing ? std::acos(std::clamp(bearing->z(), -1.0, 1.0)) : std::numbers::pi);
   };
   for (int i = 0; i <= kNumBorderPixels; ++i) {
     const double part = static_cast<double>(i) / kNumBorderPixels;
@@ -49,7 +51,7 @@ double ConeSquare(const Camera& camera) {
       look(side * camera.width, part * camera.height);
     }
   }
-  return SignedSquare(std::cos(std::min(M_PI, largest_rad + RadFromDeg(kConeMargin_deg))));
+  return SignedSquare(std::cos(std::min(std::numbers::pi, largest_rad + RadFromDeg(kConeMargin_deg))));
 }
 
 SampledCamera Sample(const Camera& camera, const FrustumOverlapOptions& options) {
@@ -130,7 +132,13 @@ CAIRN_WIDE_CLONES int ListCandidates(const double* x, const double* y, const dou
   return num_candidates;
 }
 
-// Looks from frusta at cameras: the overlap in one direction.
+// Samples of a first camera's frustum that a second may see well enough.
+struct Candidates {
+  std::vector<int32_t> idxs;  // the first `num`
+  int num = 0;
+};
+
+// Compares frusta; keeps the memory that it needs.
 class OverlapCounter {
  public:
   explicit OverlapCounter(const FrustumOverlapOptions& options)
@@ -138,33 +146,28 @@ class OverlapCounter {
         min_cosine_square_(SignedSquare(std::cos(RadFromDeg(options.max_view_angle_deg)))),
         max_squared_ratio_(options.max_scale_ratio * options.max_scale_ratio) {}
 
+  // Of the samples of `from`.
   double Overlap(const PlacedCamera& from, const PlacedCamera& other) {
-    Look(from, other);
-    return Count(from, other);
+    Look(from, other, &there_);
+    return Count(from, other, there_);
   }
 
-  // Mean of both overlaps, where one of them may be large enough; otherwise less than 0.
+  // Mean of both overlaps, where one of them is large enough; otherwise less than 0.
   double MeanOverlap(const PlacedCamera& a, const PlacedCamera& b) {
-    const double of_a = MostOverlap(a, b), of_b = MostOverlap(b, a);
-    if (std::max(of_a, of_b) < min_overlap_ratio_) return -1;
-    const double there = Count(b, a);  // of the candidates that were listed last
-    const double back = Overlap(a, b);
+    Look(a, b, &there_);
+    Look(b, a, &back_);
+    if (std::max(PartOf(there_.num, a), PartOf(back_.num, b)) < min_overlap_ratio_) return -1;
+    const double there = Count(a, b, there_), back = Count(b, a, back_);
     return std::max(there, back) >= min_overlap_ratio_ ? 0.5 * (there + back) : -1;
   }
 
  private:
-  double MostOverlap(const PlacedCamera& from, const PlacedCamera& other) {
-    Look(from, other);
-    return PartOf(num_candidates_, from);
-  }
-
-  // Lists the samples of `from` that may be seen well enough.
-  void Look(const PlacedCamera& from, const PlacedCamera& other) {
+  void Look(const PlacedCamera& from, const PlacedCamera& other, Candidates* candidates) const {
     const SampledCamera& sampled = *from.sampled;
     const Eigen::Vector3d way = other.center - from.center;
-    num_candidates_ = 0;
+    candidates->num = 0;
     if (way.squaredNorm() > sampled.reach_m * sampled.reach_m) return;
-    candidates_.resize(sampled.x.size() + 1);  // one more is written than counts
+    candidates->idxs.resize(sampled.x.size() + 1);  // one more is written than counts
     const Eigen::Vector3d center = from.cam_from_world * way;
     const Eigen::Vector3d axis = from.cam_from_world * other.cam_from_world.row(2).transpose();
     const Sight sight = {center.x(),
@@ -176,20 +179,20 @@ class OverlapCounter {
                          other.sampled->cone_square,
                          min_cosine_square_,
                          max_squared_ratio_};
-    num_candidates_ =
+    candidates->num =
         ListCandidates(sampled.x.data(), sampled.y.data(), sampled.z.data(), sampled.squared_distance.data(),
-                       static_cast<int>(sampled.x.size()), sight, candidates_.data());
+                       static_cast<int>(sampled.x.size()), sight, candidates->idxs.data());
   }
 
-  // Part of the samples that are listed and within the other's image.
-  double Count(const PlacedCamera& from, const PlacedCamera& other) const {
+  // Part of the samples that are candidates and within the other's image.
+  static double Count(const PlacedCamera& from, const PlacedCamera& other, const Candidates& candidates) {
     const SampledCamera& sampled = *from.sampled;
     const Camera& camera = other.sampled->camera;
     const Eigen::Matrix3d other_from_cam = other.cam_from_world * from.cam_from_world.transpose();
     const Eigen::Vector3d translation = other.cam_from_world * (from.center - other.center);
     int num_seen = 0;
-    for (int k = 0; k < num_candidates_; ++k) {
-      const int i = candidates_[k];
+    for (int k = 0; k < candidates.num; ++k) {
+      const int i = candidates.idxs[k];
       const Eigen::Vector3d sample(sampled.x[i], sampled.y[i], sampled.z[i]);
       const auto pixel = ImageFromCamera(camera, other_from_cam * sample + translation);
       if (pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= camera.width &&
@@ -206,8 +209,7 @@ class OverlapCounter {
   }
 
   double min_overlap_ratio_, min_cosine_square_, max_squared_ratio_;
-  std::vector<int32_t> candidates_;
-  int num_candidates_ = 0;
+  Candidates there_, back_;
 };
 
 // The images with what is computed of each camera once.
