@@ -180,6 +180,61 @@ TEST(FrustumOverlap, OverlapIsThePartOfTheSamplesThatTheOtherCameraSeesWellEnoug
   }
 }
 
+// The same two cameras somewhere else in the world.
+PosedCamera Moved(const PosedCamera& image, const Pose& new_from_old) {
+  return {image.camera, image.cam_from_world * new_from_old.Inverse()};
+}
+
+std::vector<Pose> SomePlaces() {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<Pose> places;
+  for (int i = 0; i < 50; ++i) {
+    Pose place;
+    place.rotation = Eigen::AngleAxisd(3 * uniform(random),
+                                       Eigen::Vector3d(uniform(random), 1, uniform(random)).normalized());
+    place.translation = 30 * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+    places.push_back(place);
+  }
+  return places;
+}
+
+TEST(FrustumOverlap, SamplesOnTheBorderOfTheImageAreSeenWhereverItStands) {
+  //  Of depths 1, 2, 4, 8, 16 m the first column is seen by a camera to the right, moved by half a column's
+  //  width at 1 m, on its image's left border; and by one to the left, which sees the last one, on its right
+  //  border.
+  const FrustumOverlapOptions options = {.near_m = 1, .far_m = 16};
+  const double move_m = 640.0 / 6 / 2 / 500;
+  for (const Pose& place : SomePlaces()) {
+    for (const double side : {-1.0, 1.0}) {
+      const PosedCamera image = Moved(At(0, 0), place);
+      EXPECT_EQ(FrustumOverlap(image, Moved(At(side * move_m, 0), place), options), 1.0);
+      EXPECT_EQ(FrustumOverlap(image, Moved(At(side * (move_m + 1e-4), 0), place), options), 1 - 5 / 150.0);
+      PosedCamera above = At(0, 0);
+      above.cam_from_world.translation.y() = side * 480.0 / 5 / 2 / 500;
+      EXPECT_EQ(FrustumOverlap(image, Moved(above, place), options), 1.0);
+      above.cam_from_world.translation.y() *= 1.001;
+      EXPECT_EQ(FrustumOverlap(image, Moved(above, place), options), 1 - 6 / 150.0);
+    }
+  }
+}
+
+TEST(FrustumOverlap, SamplesAtTheLargestRatioAndAngleAreSeenWhereverTheCamerasStand) {
+  //  A camera stands farther back on a sample's ray, so that its distance is the largest allowed, of the
+  //  samples before it larger than that; no other sample is on a ray that both share.
+  const FrustumOverlapOptions options = {.near_m = 1, .far_m = 16, .max_view_angle_deg = 0};
+  const Eigen::Vector3d sample =
+      4 * Eigen::Vector3d((3.5 / 6 * 640 - 320) / 500, (1.5 / 5 * 480 - 240) / 500, 1);
+  for (const Pose& place : SomePlaces()) {
+    const PosedCamera image = Moved(At(0, 0), place);
+    PosedCamera behind = At(0, 0);
+    behind.cam_from_world.translation = (options.max_scale_ratio - 1) * sample;
+    EXPECT_EQ(FrustumOverlap(image, Moved(behind, place), options), 3 / 150.0);
+    behind.cam_from_world.translation *= 1.001;
+    EXPECT_EQ(FrustumOverlap(image, Moved(behind, place), options), 2 / 150.0);
+  }
+}
+
 TEST(FrustumOverlap, OpposedViewsOfOneWallAreNotMatched) {
   // Facing each other 4 m apart: the same scene lies in both frusta, seen from opposite sides.
   PosedCamera opposite = At(0, 180);

@@ -22,9 +22,26 @@ constexpr int kNumDepths = 5;
 // taken.
 constexpr int kNumBorderPixels = 16;
 constexpr double kConeMargin_deg = 2;
+// By how much a sample may miss a limit, as part of it: what stands exactly on one, as many do between the
+// stations of a lattice, counts however the last bits are rounded, which is another matter on each processor.
+constexpr double kSlack = 1e-9;
 
 // x² with the sign of x: compares cosines without a square root.
 double SignedSquare(double x) { return x * std::abs(x); }
+
+// Whether a coordinate of a pixel is within an image of that size.
+bool IsWithin(double x, int size_px) { return std::abs(x - 0.5 * size_px) <= (0.5 + kSlack) * size_px; }
+
+// When a camera sees a sample well enough.
+struct Limits {
+  double min_cosine_square;  // signed
+  double max_squared_ratio;
+};
+
+Limits LimitsOf(const FrustumOverlapOptions& options) {
+  return {SignedSquare(std::cos(RadFromDeg(options.max_view_angle_deg))) - kSlack,
+          options.max_scale_ratio * options.max_scale_ratio * (1 + kSlack)};
+}
 
 // What the overlaps of a camera's images are computed from, in the camera's frame.
 struct SampledCamera {
@@ -76,9 +93,12 @@ SampledCamera Sample(const Camera& camera, const FrustumOverlapOptions& options)
     }
   }
   // The third side of a triangle whose other sides and the angle between them are as large as allowed.
-  const double ratio = options.max_scale_ratio;
-  const double cosine = std::cos(RadFromDeg(options.max_view_angle_deg));
-  sampled.reach_m = std::sqrt(largest_squared * (1 + ratio * ratio - 2 * ratio * cosine)) * (1 + 1e-9);
+  const Limits limits = LimitsOf(options);
+  const double cosine =
+      std::copysign(std::sqrt(std::abs(limits.min_cosine_square)), limits.min_cosine_square);
+  sampled.reach_m = std::sqrt(largest_squared * (1 + limits.max_squared_ratio -
+                                                 2 * std::sqrt(limits.max_squared_ratio) * cosine)) *
+                    (1 + kSlack);
   return sampled;
 }
 
@@ -94,7 +114,7 @@ struct Sight {
   double center_x, center_y, center_z;
   double axis_x, axis_y, axis_z;
   double cone_square;
-  double min_cosine_square, max_squared_ratio;
+  Limits limits;
 };
 
 // Lists the samples that a second camera may see well enough: rays at no more than the angle, of distances of
@@ -105,8 +125,8 @@ CAIRN_WIDE_CLONES int ListCandidates(const double* x, const double* y, const dou
   constexpr int kAtOnce = 16;
   const double center_x = sight.center_x, center_y = sight.center_y, center_z = sight.center_z;
   const double axis_x = sight.axis_x, axis_y = sight.axis_y, axis_z = sight.axis_z;
-  const double cone_square = sight.cone_square, min_cosine_square = sight.min_cosine_square;
-  const double max_squared_ratio = sight.max_squared_ratio;
+  const double cone_square = sight.cone_square, min_cosine_square = sight.limits.min_cosine_square;
+  const double max_squared_ratio = sight.limits.max_squared_ratio;
   int num_candidates = 0;
   for (int begin = 0; begin < num_samples; begin += kAtOnce) {
     const int num = std::min(kAtOnce, num_samples - begin);
@@ -142,9 +162,7 @@ struct Candidates {
 class OverlapCounter {
  public:
   explicit OverlapCounter(const FrustumOverlapOptions& options)
-      : min_overlap_ratio_(options.min_overlap_ratio),
-        min_cosine_square_(SignedSquare(std::cos(RadFromDeg(options.max_view_angle_deg)))),
-        max_squared_ratio_(options.max_scale_ratio * options.max_scale_ratio) {}
+      : min_overlap_ratio_(options.min_overlap_ratio), limits_(LimitsOf(options)) {}
 
   // Of the samples of `from`.
   double Overlap(const PlacedCamera& from, const PlacedCamera& other) {
@@ -170,15 +188,9 @@ class OverlapCounter {
     candidates->idxs.resize(sampled.x.size() + 1);  // one more is written than counts
     const Eigen::Vector3d center = from.cam_from_world * way;
     const Eigen::Vector3d axis = from.cam_from_world * other.cam_from_world.row(2).transpose();
-    const Sight sight = {center.x(),
-                         center.y(),
-                         center.z(),
-                         axis.x(),
-                         axis.y(),
-                         axis.z(),
-                         other.sampled->cone_square,
-                         min_cosine_square_,
-                         max_squared_ratio_};
+    const Sight sight = {
+        center.x(), center.y(), center.z(), axis.x(), axis.y(), axis.z(), other.sampled->cone_square,
+        limits_};
     candidates->num =
         ListCandidates(sampled.x.data(), sampled.y.data(), sampled.z.data(), sampled.squared_distance.data(),
                        static_cast<int>(sampled.x.size()), sight, candidates->idxs.data());
@@ -195,10 +207,7 @@ class OverlapCounter {
       const int i = candidates.idxs[k];
       const Eigen::Vector3d sample(sampled.x[i], sampled.y[i], sampled.z[i]);
       const auto pixel = ImageFromCamera(camera, other_from_cam * sample + translation);
-      if (pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= camera.width &&
-          pixel->y() <= camera.height) {
-        ++num_seen;
-      }
+      num_seen += pixel && IsWithin(pixel->x(), camera.width) && IsWithin(pixel->y(), camera.height) ? 1 : 0;
     }
     return PartOf(num_seen, from);
   }
@@ -208,7 +217,8 @@ class OverlapCounter {
     return num_samples == 0 ? 0.0 : static_cast<double>(num) / static_cast<double>(num_samples);
   }
 
-  double min_overlap_ratio_, min_cosine_square_, max_squared_ratio_;
+  double min_overlap_ratio_;
+  Limits limits_;
   Candidates there_, back_;
 };
 
