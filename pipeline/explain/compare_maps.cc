@@ -10,7 +10,7 @@
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
-#include "core/structure/point_grid.h"
+#include "core/structure/points.h"
 
 namespace cairn::pipeline {
 namespace {

@@ -16,18 +16,23 @@
 namespace cairn::group_classes {
 namespace {
 
-// Bytes of memory per byte of the input file, where all poses are adjusted together and where none is; there
-// no more than a part of a large file's is in memory at once (bench/scale/README.md).
-constexpr double kMemoryPerFileByte = 1.6, kMemoryPerFileByteUnadjusted = 0.8;
-constexpr double kFixedMemoryUnadjusted = 600.0 * (1 << 20), kMemoryPerLargeFileByteUnadjusted = 0.15;
+// Bytes of memory per byte of the input file, of which no more than a part is in memory at once where it is
+// large; and what adjusting poses adds to that, per image that is adjusted at once (bench/scale/README.md)
+// or, of a survey of few images, per byte of the file.
+constexpr double kMemoryPerFileByte = 0.8, kMemoryPerLargeFileByte = 0.15, kFixedMemory = 600.0 * (1 << 20);
+constexpr double kMemoryPerImageAdjusted = 150e3, kMemoryPerFileByteAdjusted = 0.8;
 
-double MemoryPerFileByte(const std::string& matches, bool may_adjust) {
-  if (may_adjust) return kMemoryPerFileByte;
+// What grouping takes.  `num_adjusted`: images whose poses are adjusted at once.
+Status CheckMemoryForMatches(const std::string& matches, size_t num_adjusted, int64_t memory_mib) {
   std::error_code error;
-  const auto num_bytes = static_cast<double>(std::filesystem::file_size(matches, error));
-  if (error || num_bytes == 0) return kMemoryPerFileByteUnadjusted;  // its reader says what is wrong
-  return std::min(kMemoryPerFileByteUnadjusted,
-                  kMemoryPerLargeFileByteUnadjusted + kFixedMemoryUnadjusted / num_bytes);
+  const auto file = static_cast<double>(std::filesystem::file_size(matches, error));
+  if (error) return Ok();  // its reader says what is wrong
+  const double unadjusted =
+      std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory);
+  const double adjusting = std::min(kMemoryPerImageAdjusted * static_cast<double>(num_adjusted),
+                                    kMemoryPerFileByteAdjusted * file);
+  return CheckMemory(fmt::format("grouping the matches of {}", matches),
+                     static_cast<int64_t>(unadjusted + adjusting), memory_mib);
 }
 
 struct Arguments {
@@ -128,13 +133,13 @@ std::string PersistenceText(const GroupClassesResult& result) {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
-  const bool may_adjust = arguments.options.refine_poses != "never";
-  Status fits = CheckMemoryForFile("grouping the matches", arguments.matches,
-                                   MemoryPerFileByte(arguments.matches, may_adjust), environment.memory_mib);
-  if (!fits.ok() && may_adjust &&
-      CheckMemoryForFile("", arguments.matches, MemoryPerFileByte(arguments.matches, false),
-                         environment.memory_mib)
-          .ok()) {
+  const GroupClassesOptions& options = arguments.options;
+  const size_t num_adjusted =
+      options.refine_poses == "never"
+          ? 0
+          : std::min(capture.images.size(), static_cast<size_t>(options.adjustment.num_images_together));
+  Status fits = CheckMemoryForMatches(arguments.matches, num_adjusted, environment.memory_mib);
+  if (!fits.ok() && CheckMemoryForMatches(arguments.matches, 0, environment.memory_mib).ok()) {
     return MakeError(fits.error().code,
                      "{}; most of it is for adjusting poses: with --refine-poses never it fits",
                      fits.error().message);
@@ -155,7 +160,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   SolvedFile solved(SolvedPath(arguments.output));
   const auto group_and_write = [&]() -> Result<GroupClassesResult> {
     CAIRN_ASSIGN_OR_RETURN(GroupClassesResult result,
-                           GroupClasses(matched, capture, arguments.options, environment.num_threads,
+                           GroupClasses(matched, capture, options, environment.num_threads,
                                         *environment.progress, &solved, sessions, arguments.output));
     CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
     return result;

@@ -43,44 +43,6 @@ TEST(IndependentParts, RegionsMayPassThroughStationsThatAreNotCoverable) {
   EXPECT_THAT(IndependentParts(Wide(world, 1, 1)), ElementsAre(ElementsAre(0, 1, 2, 3, 4, 5, 6)));
 }
 
-TEST(FloorWindows, HaveEveryStationOnceAndNoMoreThanTheyMay) {
-  Random of_places(3);
-  std::vector<Eigen::Vector2d> positions;
-  std::vector<StationIdx> stations;
-  for (int i = 0; i < 500; ++i) {
-    positions.emplace_back(of_places.Uniform(0, 30), of_places.Uniform(0, 10));
-    if (i % 3 != 0) stations.push_back(i);
-  }
-  std::set<std::vector<StationIdx>> firsts;
-  for (const uint64_t seed : {1, 2, 3}) {
-    Random random(seed);
-    std::vector<StationIdx> all;
-    const auto windows = FloorWindows(positions, stations, 40, &random);
-    for (const std::vector<StationIdx>& window : windows) {
-      EXPECT_LE(window.size(), 40u);
-      EXPECT_GE(window.size(), 10u);  // less than a window is not divided
-      EXPECT_TRUE(std::is_sorted(window.begin(), window.end()));
-      all.insert(all.end(), window.begin(), window.end());
-      double low = 30, high = 0;  // of a floor of three to one nothing is wider than half of it
-      for (const StationIdx s : window) {
-        low = std::min(low, positions[s].x());
-        high = std::max(high, positions[s].x());
-      }
-      EXPECT_LT(high - low, 16);
-    }
-    std::sort(all.begin(), all.end());
-    EXPECT_EQ(all, stations);
-    firsts.insert(windows.front());
-  }
-  EXPECT_EQ(firsts.size(), 3u);  // other borders each time
-  Random random(1);
-  EXPECT_THAT(FloorWindows(positions, {}, 40, &random), IsEmpty());
-  EXPECT_THAT(FloorWindows(positions, {7, 5}, 2, &random), ElementsAre(ElementsAre(5, 7)));
-  // All at one place.
-  EXPECT_EQ(
-      FloorWindows(std::vector<Eigen::Vector2d>(8, {1, 1}), {0, 1, 2, 3, 4, 5, 6, 7}, 1, &random).size(), 8u);
-}
-
 TEST(WorldPart, IsTheWorldOfItsStations) {
   const World world = RandomWorld(9, 7, 40, false, 5);
   const ReducedWorld wide = Wide(world, 3, 1);

@@ -382,13 +382,12 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
   }
 }
 
-}  // namespace
 TEST(Memory, GroupingThatFitsWithoutAdjustingPosesSaysSo) {
   TemporaryFolder folder("grouping_memory_test");
   fs::create_directories(folder / "work");
   const Workplace workplace(folder / "work");
-  // Between what is needed without and with adjusting: 0.8 and 1.6 bytes per byte beside the program's 64
-  // MiB.
+  // Between what is needed without and with adjusting so few images: 0.8 and 1.6 bytes per byte beside the
+  // program's 64 MiB.
   const auto memory_mib =
       static_cast<int>(64 + (fs::file_size(workplace.Build("matches.db")) * 1.2) / (1 << 20));
   const std::string command =
@@ -401,4 +400,5 @@ TEST(Memory, GroupingThatFitsWithoutAdjustingPosesSaysSo) {
   EXPECT_EQ(grouped.exit_code, 0) << grouped.err;
 }
 
+}  // namespace
 }  // namespace cairn

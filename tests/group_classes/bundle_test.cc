@@ -57,6 +57,35 @@ TEST(AdjustBundle, MovedPosesAndPointsReturn) {
   }
 }
 
+// Every second pose is fixed where it is right; the others, from which they are stated to be a step away, and
+// the points return to them, without the frame of all.
+TEST(AdjustBundle, FixedPosesStayToTheBitAndOthersReturnToThem) {
+  const Camera camera = Lens();
+  Circle circle = MakeCircle(camera, camera, 0.1, {});
+  Random random(8);
+  circle.problem.noise = {0.05, 2, 0.05, 2};
+  for (size_t i = 0; i < circle.poses.size(); ++i) {
+    BundleProblem::Image& image = circle.problem.images[i];
+    image.is_fixed = i % 2 == 1;
+    if (image.is_fixed) continue;
+    image.cam_from_world.translation +=
+        0.02 * Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+    image.drifted.translation.x() += 0.01;
+  }
+  EXPECT_TRUE(AdjustBundle({}, &circle.problem, nullptr));
+  for (size_t i = 0; i < circle.poses.size(); ++i) {
+    const BundleProblem::Image& image = circle.problem.images[i];
+    EXPECT_LT(CenterErrorM(image.cam_from_world, circle.poses[i]), 0.002) << i;
+    if (i % 2 == 1) {
+      EXPECT_EQ(image.cam_from_world.translation, circle.poses[i].translation);
+      EXPECT_EQ(image.cam_from_world.rotation.coeffs(), circle.poses[i].rotation.coeffs());
+      EXPECT_EQ(image.drifted.translation, circle.poses[i].translation);
+    } else if (i > 0) {  // its drifted pose is pulled by the fixed ones before and after it
+      EXPECT_LT(CenterErrorM(image.drifted, circle.poses[i]), 0.003) << i;
+    }
+  }
+}
+
 // Points that lie far off, along their rays or not, are placed by the poses of a step before it is judged:
 // after one step they are where these poses see them.  By a step alone they are not, as it is linear.
 TEST(AdjustBundle, PointsFollowTheStepOfThePoses) {

@@ -249,6 +249,66 @@ TEST(GroupClasses, PointsFollowTheStepsOfAWholeThatWasInParts) {
   EXPECT_LT(MeanErrorDeg(survey, classes, false), 0.1 * MeanErrorDeg(survey, classes, true));
 }
 
+// Of distances between cameras, root mean square.
+double DistanceErrorM(const Survey& survey, const Classes& classes, bool stated) {
+  double sum = 0;
+  int count = 0;
+  for (size_t i = 0; i < survey.true_poses.size(); ++i) {
+    for (size_t j = 0; j < i; ++j, ++count) {
+      const auto pose = [&](size_t k) {
+        return stated ? classes.images[k].given_cam_from_world : classes.images[k].cam_from_world;
+      };
+      sum += std::pow(
+          CenterErrorM(pose(i), pose(j)) - CenterErrorM(survey.true_poses[i], survey.true_poses[j]), 2);
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+// Two blocks of twelve images turn as right as all 24 together.  What their size is beside each other they
+// know from five images only.
+TEST(GroupClasses, DriftIsStraightenedBlockByBlock) {
+  const Survey survey = MakeSurvey({.walk_m = 0.01, .walk_deg = 0.4});
+  GroupClassesOptions options;
+  options.adjustment.num_images_at_once = 20;
+  const Classes together = Group(survey, options).classes;
+  options.adjustment.num_images_together = 12;
+  const Classes in_blocks = Group(survey, options).classes;
+  EXPECT_LT(MeanErrorDeg(survey, in_blocks, false), 0.1 * MeanErrorDeg(survey, in_blocks, true));
+  EXPECT_LT(MeanErrorDeg(survey, in_blocks, false), 1.3 * MeanErrorDeg(survey, together, false));
+  EXPECT_NE(MeanErrorDeg(survey, in_blocks, false), MeanErrorDeg(survey, together, false));
+  EXPECT_LT(DistanceErrorM(survey, in_blocks, false), 0.9 * DistanceErrorM(survey, in_blocks, true));
+  // One thread or three.
+  const Classes again = Group(survey, options, 1).classes, thrice = Group(survey, options, 3).classes;
+  for (size_t i = 0; i < again.images.size(); ++i) {
+    EXPECT_EQ(again.images[i].cam_from_world.translation, in_blocks.images[i].cam_from_world.translation);
+    EXPECT_EQ(thrice.images[i].cam_from_world.translation, in_blocks.images[i].cam_from_world.translation);
+  }
+}
+
+TEST(GroupClasses, OffsetAndFocalLengthAreThoseOfAllBlocks) {
+  SurveyNoise noise{.pose_m = 0.002, .pose_deg = 0.05, .focal_ratio = 1.02};
+  noise.offset.translation = Eigen::Vector3d(0.04, -0.01, 0.02);
+  noise.offset.rotation = Eigen::AngleAxisd(RadFromDeg(1.5), Eigen::Vector3d(0.6, 0, 0.8));
+  const Survey survey = MakeSurvey(noise);
+  GroupClassesOptions options;
+  options.initial_reprojection_error_px = 30;
+  options.adjustment.num_images_learnt = 10;  // of 24
+  const GroupClassesResult together = Group(survey, options);
+  options.adjustment.num_images_together = 10;
+  const GroupClassesResult in_blocks = Group(survey, options);
+  ASSERT_TRUE(in_blocks.findings.has_offset);
+  ASSERT_GT(in_blocks.findings.pose_gain, 0);
+  const Pose& offset = in_blocks.classes.camera_from_given;
+  EXPECT_LT((offset.translation - noise.offset.translation).norm(), 0.01);
+  EXPECT_LT(RotationErrorDeg(offset, noise.offset), 0.2);
+  EXPECT_NE(offset.translation, in_blocks.findings.camera_from_given.translation);  // as learnt from a few
+  const double focal_px = in_blocks.classes.cameras[0].FocalX();
+  EXPECT_NEAR(focal_px, 510, 3);
+  EXPECT_NEAR(focal_px, together.classes.cameras[0].FocalX(), 1.5);
+  EXPECT_NE(focal_px, in_blocks.findings.cameras[0].camera.FocalX());
+}
+
 TEST(GroupClasses, LensThatNobodyStatedIsFound) {
   const Survey survey = MakeSurvey({.k1 = -0.12});
   GroupClassesOptions options;

@@ -249,6 +249,7 @@ TEST_F(SolvedFileTest, AllThatASolutionDependsOnIsInItsHash) {
       [](BundleProblem* p) { p->images[1].stated.translation.x() += 1e-9; },
       [](BundleProblem* p) { p->images[1].way_m += 1e-9; },
       [](BundleProblem* p) { p->images[1].dispersion += 1e-9; },
+      [](BundleProblem* p) { p->images[1].is_fixed = true; },
       [](BundleProblem* p) { p->images[1].cam_from_world.translation.y() += 1e-9; },
       [](BundleProblem* p) { p->images[1].drifted.rotation.x() += 1e-9; },
       [](BundleProblem* p) { p->observations[3].image_idx ^= 1; },

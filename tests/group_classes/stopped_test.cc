@@ -48,13 +48,13 @@ class StoppedStage : public testing::Test {
 
   // Sends the signal once that many bytes of solutions are kept.  Returns the exit code; -1 where the run had
   // ended by then.
-  static int StopAfter(int64_t num_bytes, const std::string& signal) {
+  static int StopAfter(int64_t num_bytes, const std::string& signal, const std::string& more = "") {
     const std::string solved = *folder_ / "it.db.solved";
     const ProgramRun run =
         RunShell(fmt::format("({}) & pid=$!; while kill -0 $pid 2>/dev/null; do "
                              "if [ $(stat -c %s '{}' 2>/dev/null || echo 0) -ge {} ]; then kill -{} $pid; "
                              "break; fi; done; wait $pid",
-                             Command("it.db"), solved, num_bytes, signal));
+                             Command("it.db", more), solved, num_bytes, signal));
     return fs::exists(solved) ? run.exit_code : -1;
   }
 
@@ -82,6 +82,18 @@ TEST_F(StoppedStage, KilledRunGoesOnToTheSameBytes) {
     fs::remove(*folder_ / "it.db");
   }
   EXPECT_GE(num_killed, 3);
+}
+
+TEST_F(StoppedStage, KilledAmongBlocksItGoesOnToTheSameBytes) {
+  const std::string blocks = "--num-images-together 40";
+  ASSERT_EQ(RunShell(Command("blocks.db", blocks)).exit_code, 0);
+  EXPECT_NE(*HashFile(*folder_ / "blocks.db"), *HashFile(*folder_ / "whole.db"));
+  const int64_t num_bytes = 1200000;  // some of the blocks; learning and parts are 860,000
+  ASSERT_EQ(StopAfter(num_bytes, "KILL", blocks), 128 + 9);
+  const ProgramRun run = RunShell(Command("it.db", "--threads 1 " + blocks));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("goes on where an earlier run stood"));
+  EXPECT_EQ(*HashFile(*folder_ / "it.db"), *HashFile(*folder_ / "blocks.db"));
 }
 
 TEST_F(StoppedStage, KilledAgainAndAgainItEnds) {

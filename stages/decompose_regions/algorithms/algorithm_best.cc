@@ -14,6 +14,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/structure/points.h"
 #include "stages/decompose_regions/cover/column_generation.h"
 #include "stages/decompose_regions/cover/core_finder.h"
 #include "stages/decompose_regions/cover/cover_search.h"
@@ -303,7 +304,7 @@ std::vector<int> PartwiseCover::Owners(const Part& part) const {
 std::vector<PartwiseCover::Window> PartwiseCover::MakeWindows(const Part& part, int most, Random* random) {
   std::vector<Window> windows;
   std::vector<int> window_of(wide_.num_stations(), -1);
-  for (std::vector<StationIdx>& stations : FloorWindows(world_.positions, part.open, most, random)) {
+  for (std::vector<StationIdx>& stations : DividePoints(world_.positions, part.open, most, random)) {
     for (const StationIdx station : stations) window_of[station] = static_cast<int>(windows.size());
     windows.emplace_back().stations = std::move(stations);
   }

@@ -1,14 +1,10 @@
 #include "stages/decompose_regions/cover/world_parts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 namespace cairn::decompose_regions {
 namespace {
-
-// A window is divided at a part of its stations between this and one minus this.
-constexpr double kLeastShare = 0.38;
 
 // Whether two ascending lists have `num` values in common.
 bool HaveInCommon(std::span<const int32_t> a, std::span<const int32_t> b, int num) {
@@ -31,30 +27,6 @@ std::vector<int32_t> PlacesOf(const Values& all, std::span<const int32_t> some) 
     if (found != all.end() && *found == value) places.push_back(static_cast<int32_t>(found - all.begin()));
   }
   return places;
-}
-
-void Divide(const std::vector<Eigen::Vector2d>& positions, std::vector<StationIdx> stations, int most,
-            Random* random, std::vector<std::vector<StationIdx>>* windows) {
-  if (static_cast<int>(stations.size()) <= most) {
-    std::sort(stations.begin(), stations.end());
-    windows->push_back(std::move(stations));
-    return;
-  }
-  Eigen::Array2d low = positions[stations[0]], high = low;
-  for (const StationIdx station : stations) {
-    low = low.min(positions[station].array());
-    high = high.max(positions[station].array());
-  }
-  const int axis = (high - low).x() >= (high - low).y() ? 0 : 1;
-  const double share = random->Uniform(kLeastShare, 1 - kLeastShare);
-  const auto middle =
-      stations.begin() + std::clamp<ptrdiff_t>(std::lround(share * static_cast<double>(stations.size())), 1,
-                                               std::ssize(stations) - 1);
-  std::nth_element(stations.begin(), middle, stations.end(), [&](StationIdx a, StationIdx b) {
-    return std::pair(positions[a][axis], a) < std::pair(positions[b][axis], b);
-  });
-  Divide(positions, {stations.begin(), middle}, most, random, windows);
-  Divide(positions, {middle, stations.end()}, most, random, windows);
 }
 
 }  // namespace
@@ -80,14 +52,6 @@ std::vector<std::vector<StationIdx>> IndependentParts(const ReducedWorld& wide) 
     parts.push_back(std::move(part));
   }
   return parts;
-}
-
-std::vector<std::vector<StationIdx>> FloorWindows(const std::vector<Eigen::Vector2d>& positions,
-                                                  std::vector<StationIdx> stations, int most,
-                                                  Random* random) {
-  std::vector<std::vector<StationIdx>> windows;
-  if (!stations.empty()) Divide(positions, std::move(stations), most, random, &windows);
-  return windows;
 }
 
 CoreRegion WorldPart::InWhole(const CoreRegion& core) const {

@@ -4,9 +4,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
-#include "core/base/random.h"
 #include "stages/decompose_regions/cover/cover.h"
 #include "stages/decompose_regions/cover/reduced_world.h"
 
@@ -20,12 +17,6 @@ namespace cairn::decompose_regions {
 // parts. Only parts with coverable stations, by their first station; each ascending.  O(edges * features of a
 // station).
 std::vector<std::vector<StationIdx>> IndependentParts(const ReducedWorld& wide);
-
-// Divides stations into windows of at most `most` by lines across the floor, each across the longer side of
-// what it divides, near its middle: where exactly is drawn from `random`, so that other windows have other
-// borders. Each ascending.  REQUIRES: most >= 1
-std::vector<std::vector<StationIdx>> FloorWindows(const std::vector<Eigen::Vector2d>& positions,
-                                                  std::vector<StationIdx> stations, int most, Random* random);
 
 // Some stations of a world as a world of its own, in the same order.
 struct WorldPart {

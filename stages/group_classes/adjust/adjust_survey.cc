@@ -9,6 +9,8 @@
 
 #include "core/base/parallel.h"
 #include "core/camera/panorama.h"
+#include "stages/group_classes/adjust/blocks.h"
+#include "stages/group_classes/adjust/choose_tracks.h"
 #include "stages/group_classes/adjust/left_out.h"
 #include "stages/group_classes/adjust/parts.h"
 #include "stages/group_classes/tracks/sub_survey.h"
@@ -34,18 +36,37 @@ constexpr int kNumStepsAtOnce = 4;
 // take several steps more.
 constexpr double kTrustInStraightened = 1e7;
 
-// Observations of a point that are adjusted, at most: k of them cost k^2, and say little more.
-constexpr size_t kMaxNumObservations = 16;
+// Rounds in which a survey's blocks are adjusted, each with other borders.
+constexpr int kNumRoundsOfBlocks = 3;
 
-// At most kMaxNumObservations of them, spread from the first to the last: both ends of a track, and all its
-// passes, are what it joins.
-std::vector<int> Spread(const std::vector<int>& inliers) {
-  if (inliers.size() <= kMaxNumObservations) return inliers;
-  std::vector<int> spread;
-  for (size_t k = 0; k < kMaxNumObservations; ++k)
-    spread.push_back(inliers[k * (inliers.size() - 1) / (kMaxNumObservations - 1)]);
-  return spread;
-}
+// The rotation from which some differ least, in the mean.
+class MeanRotation {
+ public:
+  void Add(const Eigen::Quaterniond& rotation) { sum_ += rotation.coeffs() * rotation.coeffs().transpose(); }
+  Eigen::Quaterniond Mean() const {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum_);
+    return Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
+  }
+
+ private:
+  Eigen::Matrix4d sum_ = Eigen::Matrix4d::Zero();
+};
+
+// Of each camera the mean of what was found.
+class MeanCameras {
+ public:
+  explicit MeanCameras(std::vector<Camera> before) : mean_(std::move(before)), num_(mean_.size(), 0) {}
+  void Add(int idx, const Camera& camera) {
+    const double part = 1.0 / ++num_[idx];
+    for (size_t p = 0; p < camera.params.size(); ++p)
+      mean_[idx].params[p] += part * (camera.params[p] - mean_[idx].params[p]);
+  }
+  const std::vector<Camera>& Mean() const { return mean_; }
+
+ private:
+  std::vector<Camera> mean_;
+  std::vector<int> num_;
+};
 
 class SurveyAdjuster {
  public:
@@ -149,6 +170,11 @@ class SurveyAdjuster {
       bundle_options_.points_follow = true;
       bundle_options_.num_steps_at_once = kNumStepsAtOnce;
     }
+    if (posed_.num_images() > options_.num_images_together) {
+      AdjustBlocks(first);
+      if (!progress_.Cancelled()) KeepFrame();
+      return;
+    }
     if (progress_.Cancelled()) return;
     progress_.Begin("adjust all poses", 2 * int64_t{options_.max_num_iterations}, "steps at most");
     bundle_options_.steps = &progress_;
@@ -163,31 +189,56 @@ class SurveyAdjuster {
     KeepFrame();
   }
 
-  // Adjusts poses alone by what was learnt, from those that are known, where they were freed from drift.
-  PosesOfPart AdjustPoses(const SurveyFindings& findings, std::vector<Pose> drifted,
-                          const TriangulateOptions& first) {
+  // Adjusts poses alone by what was learnt of the whole, from those that are known, where they were freed
+  // from drift.
+  PosesOfPart AdjustPart(const SurveyAdjuster& whole, const std::vector<Pose>& drifted,
+                         const TriangulateOptions& first) {
+    TakeOver(whole, drifted);
+    Select(TriangulateTracks(matched_, tracks_, posed_, first, num_threads_));
+    Adjust(nullptr);
+    return {posed_.poses, DriftedPoses()};
+  }
+
+  // The same of a block, whose tracks these are, and, where they are to be, of the cameras in it.
+  PosesOfPart AdjustAsBlock(const SurveyAdjuster& whole, const std::vector<Pose>& drifted,
+                            const SurveyBlock& block, bool with_cameras) {
+    TakeOver(whole, drifted);
+    bundle_options_ = whole.bundle_options_;
+    for (size_t i = 0; i < problem_.images.size(); ++i) problem_.images[i].is_fixed = block.is_fixed[i] != 0;
+    if (with_cameras) {
+      candidates_ = whole.candidates_;
+      variants_ = whole.variants_;
+    }
+    selected_ = block.tracks;
+    Fill(block.triangulations);
+    Adjust(nullptr);
+    return {posed_.poses, DriftedPoses()};
+  }
+
+ private:
+  void TakeOver(const SurveyAdjuster& whole, const std::vector<Pose>& drifted) {
     is_learning_ = false;
-    findings_ = findings;
-    problem_.noise = findings.noise;
+    findings_ = whole.findings_;
+    problem_.noise = findings_.noise;
     problem_.is_offset_free = false;
     problem_.camera_from_given = posed_.camera_from_given;
     for (int i = 0; i < posed_.num_images(); ++i) {
       problem_.images[i].cam_from_world = posed_.poses[i];
       problem_.images[i].drifted = drifted[i];
     }
-    Select(TriangulateTracks(matched_, tracks_, posed_, first, num_threads_));
-    Adjust(nullptr);
-    for (int i = 0; i < posed_.num_images(); ++i) drifted[i] = problem_.images[i].drifted;
-    return {posed_.poses, std::move(drifted)};
   }
 
- private:
+  std::vector<Pose> DriftedPoses() const {
+    std::vector<Pose> drifted;
+    for (const BundleProblem::Image& image : problem_.images) drifted.push_back(image.drifted);
+    return drifted;
+  }
+
   // One round of parts (parts.h).
   void AdjustParts(int num_parts, const TriangulateOptions& first) {
     const std::vector<int> begins = BeginsOfParts(posed_.num_images(), num_parts);
     std::vector<std::vector<Track>> tracks = SplitTracks(tracks_, begins);
-    std::vector<Pose> drifted;
-    for (const BundleProblem::Image& image : problem_.images) drifted.push_back(image.drifted);
+    const std::vector<Pose> drifted = DriftedPoses();
     std::vector<PosesOfPart> parts(num_parts);
     progress_.Begin("straighten poses", num_parts, "parts");
     ParallelFor(num_parts, num_threads_, [&](int64_t p) {
@@ -198,7 +249,7 @@ class SurveyAdjuster {
       parts[p] =
           SurveyAdjuster(matched_, sub.tracks, triangulate_, options_, 1, progress_, bundle_options_.solved,
                          &sub.posed)
-              .AdjustPoses(findings_, {drifted.begin() + begins[p], drifted.begin() + begins[p + 1]}, first);
+              .AdjustPart(*this, {drifted.begin() + begins[p], drifted.begin() + begins[p + 1]}, first);
       progress_.Advance();
     });
     progress_.End();
@@ -209,6 +260,78 @@ class SurveyAdjuster {
       problem_.images[i].drifted = whole.drifted[i];
     }
     posed_.poses = std::move(whole.poses);
+  }
+
+  // All rounds of blocks (blocks.h).  Cameras and the offset are what the blocks find in the mean; in the
+  // last round they stay.
+  void AdjustBlocks(const TriangulateOptions& first) {
+    for (int round = 0; round < kNumRoundsOfBlocks && !progress_.Cancelled(); ++round) {
+      const bool is_last = round == kNumRoundsOfBlocks - 1;
+      if (is_last) bundle_options_.function_tolerance = BundleOptions().function_tolerance;
+      const std::vector<std::vector<int32_t>> blocks =
+          BlocksOfRound(posed_, round, options_.num_images_together);
+      const std::vector<std::vector<int64_t>> tracks_of =
+          TracksOfBlocks(tracks_, blocks, posed_.num_images());
+      MeanCameras cameras(posed_.cameras);
+      progress_.Begin("adjust poses", std::ssize(blocks), "blocks");
+      for (size_t b = 0; b < blocks.size() && !progress_.Cancelled(); ++b) {
+        if (round == 0) {
+          const int last = blocks[b].back();
+          const Pose before = problem_.images[last].drifted;
+          AdjustBlock(blocks[b], tracks_of[b], last + 1, first, true, nullptr);
+          // Again, with all that agrees now.
+          AdjustBlock(blocks[b], tracks_of[b], last + 1, triangulate_, true, &cameras);
+          MoveAlong(last + 1, before.Inverse() * problem_.images[last].drifted);
+        } else {
+          AdjustBlock(blocks[b], tracks_of[b], posed_.num_images(), triangulate_, !is_last, &cameras);
+        }
+        progress_.Advance();
+      }
+      progress_.End();
+      if (is_last || progress_.Cancelled()) continue;
+      posed_.cameras = cameras.Mean();
+      if (findings_.has_offset) posed_.camera_from_given = problem_.camera_from_given = MeanOffset();
+    }
+  }
+
+  // `num_known`: images that are there by now.  `cameras`: gets those of the block; may be null.
+  void AdjustBlock(const std::vector<int32_t>& images, const std::vector<int64_t>& tracks, int num_known,
+                   const TriangulateOptions& triangulate, bool with_cameras, MeanCameras* cameras) {
+    const SurveyBlock block = CutOutBlock(matched_, posed_, tracks_, tracks, images, num_known, triangulate,
+                                          options_.num_keypoints_adjusted, num_threads_);
+    PosedImages posed = SelectImages(posed_, block.images);
+    std::vector<Pose> drifted;
+    for (const int i : block.images) drifted.push_back(problem_.images[i].drifted);
+    const PosesOfPart adjusted = SurveyAdjuster(matched_, block.tracks, triangulate_, options_, num_threads_,
+                                                progress_, bundle_options_.solved, &posed)
+                                     .AdjustAsBlock(*this, drifted, block, with_cameras);
+    for (size_t i = 0; i < block.images.size(); ++i) {
+      if (block.is_fixed[i] != 0) continue;
+      BundleProblem::Image& image = problem_.images[block.images[i]];
+      image.cam_from_world = posed_.poses[block.images[i]] = adjusted.poses[i];
+      image.drifted = adjusted.drifted[i];
+      if (cameras != nullptr) cameras->Add(posed.camera_idx[i], posed.cameras[posed.camera_idx[i]]);
+    }
+  }
+
+  void MoveAlong(int first, const Pose& now_from_world) {
+    for (int i = first; i < posed_.num_images(); ++i) {
+      BundleProblem::Image& image = problem_.images[i];
+      image.cam_from_world = posed_.poses[i] = image.cam_from_world * now_from_world;
+      image.drifted = image.drifted * now_from_world;
+    }
+  }
+
+  // From poses freed from drift to those of the cameras.
+  Pose MeanOffset() const {
+    MeanRotation rotation;
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+    for (const BundleProblem::Image& image : problem_.images) {
+      const Pose offset = image.cam_from_world * image.drifted.Inverse();
+      rotation.Add(offset.rotation);
+      translation += offset.translation;
+    }
+    return {rotation.Mean(), translation / static_cast<double>(problem_.images.size())};
   }
 
   void MakeImages() {
@@ -243,25 +366,12 @@ class SurveyAdjuster {
     return matched_.features[posed_.feature_idx[element.image_idx]].keypoints[element.keypoint_idx];
   }
 
-  // The longest tracks with which every image has enough keypoints.
+  // Those tracks that decide on poses and cameras.
   void Select(const std::vector<Triangulation>& triangulations) {
-    std::vector<size_t> order;
-    for (size_t t = 0; t < tracks_.size(); ++t) {
-      if (triangulations[t].outcome == TriangulateOutcome::kOk) order.push_back(t);
-    }
-    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-      return triangulations[a].inliers.size() > triangulations[b].inliers.size();
-    });
-    std::vector<int> count(posed_.num_images(), 0);
     selected_.clear();
     std::vector<Triangulation> chosen;
-    for (const size_t t : order) {
-      const auto is_wanted = [&](int i) {
-        return count[tracks_[t][i].image_idx] < options_.num_keypoints_adjusted;
-      };
-      const std::vector<int> spread = Spread(triangulations[t].inliers);
-      if (std::none_of(spread.begin(), spread.end(), is_wanted)) continue;
-      for (const int i : spread) ++count[tracks_[t][i].image_idx];
+    for (const size_t t : ChooseTracks(tracks_, triangulations, std::vector<char>(posed_.num_images(), 1),
+                                       options_.num_keypoints_adjusted)) {
       selected_.push_back(tracks_[t]);
       chosen.push_back(triangulations[t]);
     }
@@ -275,7 +385,7 @@ class SurveyAdjuster {
     scales_.clear();
     size_t num_seen = 0;  // at most
     for (const Triangulation& triangulation : triangulations)
-      num_seen += std::min(triangulation.inliers.size(), kMaxNumObservations);
+      num_seen += Spread(triangulation.inliers).size();
     problem_.observations.reserve(num_seen);
     scales_.reserve(num_seen);
     std::vector<TrackElement> seen;  // per observation
@@ -455,17 +565,14 @@ class SurveyAdjuster {
   // Turns and moves everything so that the stated poses, freed from drift, are where they were stated, in the
   // mean: a walk has no frame of its own.
   void KeepFrame() {
-    Eigen::Matrix4d turns = Eigen::Matrix4d::Zero();
-    for (const BundleProblem::Image& image : problem_.images) {
-      const Eigen::Quaterniond turn = image.stated.rotation.conjugate() * image.drifted.rotation;
-      turns += turn.coeffs() * turn.coeffs().transpose();
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(turns);
-    const Eigen::Quaterniond stated_from_drifted(Eigen::Vector4d(solver.eigenvectors().col(3)));
+    MeanRotation turn;
+    for (const BundleProblem::Image& image : problem_.images)
+      turn.Add(image.stated.rotation.conjugate() * image.drifted.rotation);
+    const Eigen::Quaterniond stated_from_drifted = turn.Mean();
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();
     for (const BundleProblem::Image& image : problem_.images)
       shift += image.stated.Center() - stated_from_drifted * image.drifted.Center();
-    const Pose frame{stated_from_drifted.normalized(), shift / std::max<double>(1, problem_.images.size())};
+    const Pose frame{stated_from_drifted, shift / std::max<double>(1, problem_.images.size())};
     const Pose back = frame.Inverse();
     for (int i = 0; i < posed_.num_images(); ++i) posed_.poses[i] = problem_.images[i].cam_from_world * back;
     posed_.camera_from_given = problem_.camera_from_given;

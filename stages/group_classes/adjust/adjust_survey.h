@@ -32,6 +32,9 @@ struct AdjustSurveyOptions {
   // Poses of a survey of more images are straightened in parts (parts.h) before all are adjusted together.
   // REQUIRES: >= 10
   int num_images_at_once = 600;
+  // Poses of a survey of more images are adjusted block by block (blocks.h), each of at most so many: memory
+  // is that of a block.  REQUIRES: >= 10
+  int num_images_together = 5000;
 };
 OptionTable DescribeOptions(AdjustSurveyOptions* options);
 
@@ -73,7 +76,7 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 //     and than chance; what they share is no camera's;
 //   - an offset that is not significant is none;
 //   - a large survey is straightened in parts first (parts.h), so that its size adds no steps to the
-//     adjustment of the whole.
+//     adjustment of the whole; and a very large one is then adjusted block by block (blocks.h).
 // The world frame stays that of the stated poses, in the mean.  Changes poses, cameras and
 // camera_from_given of `posed`.  `solved`: where what was solved is kept (solved_file.h); may be null.
 // `first`: how tracks are triangulated by poses and cameras as stated.  Stops early, with no meaning, when

@@ -43,6 +43,10 @@ OptionTable DescribeOptions(AdjustSurveyOptions* o) {
        .value = &o->num_images_at_once,
        .help = "poses of a survey of more images are straightened in parts before all are adjusted together",
        .min = 10},
+      {.name = "num_images_together",
+       .value = &o->num_images_together,
+       .help = "most images whose poses are adjusted together: a larger survey is adjusted block by block",
+       .min = 10},
   };
   table.insert(table.end(), others.begin(), others.end());
   AddCondition({"refine_cameras", {"true"}},

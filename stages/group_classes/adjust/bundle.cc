@@ -136,6 +136,7 @@ class SchurBundle {
         summary.initial_cost, summary.final_cost,
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     for (size_t i = 0; i < num_images_; ++i) {
+      if (bundle_.images[i].is_fixed) continue;  // to the bit
       bundle_.images[i].cam_from_world = LoadPose(ValuesOf(CamFromWorld(i)));
       bundle_.images[i].drifted = LoadPose(ValuesOf(Drifted(i)));
     }
@@ -196,8 +197,11 @@ class SchurBundle {
       return problem_.AddBlock(std::exchange(next, next + kPoseBlockSize), kPoseBlockSize, &manifold_);
     };
     for (const BundleProblem::Image& image : bundle_.images) {
-      add_pose(image.cam_from_world);
-      add_pose(image.drifted);
+      const int pose = add_pose(image.cam_from_world), drifted = add_pose(image.drifted);
+      if (image.is_fixed) {
+        problem_.SetConstant(pose);
+        problem_.SetConstant(drifted);
+      }
       losses_.push_back(std::make_unique<ceres::ScaledLoss>(new ceres::CauchyLoss(options_.loss_scale),
                                                             1 / image.dispersion, ceres::TAKE_OWNERSHIP));
     }
@@ -226,13 +230,14 @@ class SchurBundle {
   void AddStatedPose(size_t i) {
     const BundleProblem::Image& image = bundle_.images[i];
     const PoseNoise& noise = bundle_.noise;
-    own_errors_.push_back(static_cast<int>(problem_.residuals().size()));
-    problem_.AddResidual(
-        costs_.Add(
-            new ceres::AutoDiffCostFunction<OwnErrorCost, 6, kPoseBlockSize, kPoseBlockSize, kPoseBlockSize>(
-                new OwnErrorCost{RadFromDeg(noise.own_deg), noise.own_m})),
-        nullptr, {CamFromWorld(i), Drifted(i), offset_block_});
-    if (i == 0) return;
+    if (!image.is_fixed) {
+      own_errors_.push_back(static_cast<int>(problem_.residuals().size()));
+      problem_.AddResidual(costs_.Add(new ceres::AutoDiffCostFunction<OwnErrorCost, 6, kPoseBlockSize,
+                                                                      kPoseBlockSize, kPoseBlockSize>(
+                               new OwnErrorCost{RadFromDeg(noise.own_deg), noise.own_m})),
+                           nullptr, {CamFromWorld(i), Drifted(i), offset_block_});
+    }
+    if (i == 0 || (image.is_fixed && bundle_.images[i - 1].is_fixed)) return;
     const double root = std::sqrt(image.way_m);
     walks_.push_back(static_cast<int>(problem_.residuals().size()));
     problem_.AddResidual(

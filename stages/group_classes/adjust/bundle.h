@@ -41,6 +41,7 @@ struct BundleProblem {
     double dispersion = 1;  // its keypoints say as much as this many times fewer (keypoint_noise.h)
     Pose cam_from_world;    // refined
     Pose drifted;           // refined: the stated pose, freed from drift
+    bool is_fixed = false;  // both stay as they are
   };
   struct Observation {
     int image_idx = 0;
@@ -109,8 +110,8 @@ Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Ob
 //   + sum_i |D_i D_i-1^-1 (G_i G_i-1^-1)^-1|^2 / (walk^2 way_i)            drift of the stated poses G_i
 //   + |O|^2 / offset^2 + |c - prior|^2 / sigma^2
 // with reprojection residuals r (core/camera/pixel_ray.h), which a camera changes as CameraSensitivity says.
-// D of the first image is fixed.  Analytic derivatives, points eliminated (core/structure/schur_solver.h).
-// Returns whether it converged.  `evidence` may be null.
+// D of the first image is fixed, and T and D of those that are.  Analytic derivatives, points eliminated
+// (core/structure/schur_solver.h). Returns whether it converged.  `evidence` may be null.
 bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence);
 
 }  // namespace cairn::group_classes

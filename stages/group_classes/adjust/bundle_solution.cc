@@ -70,7 +70,7 @@ ContentHash HashBundle(const BundleOptions& options, const BundleProblem& proble
              options.initial_trust_region_radius, options.points_follow, with_evidence);
   hasher.Add(problem.images.size());
   for (const BundleProblem::Image& image : problem.images) {
-    hasher.Add(image.camera_idx, image.way_m, image.dispersion);
+    hasher.Add(image.camera_idx, image.way_m, image.dispersion, image.is_fixed);
     for (const Pose* pose : {&image.stated, &image.cam_from_world, &image.drifted}) hasher.AddPose(*pose);
   }
   hasher.Add(problem.observations.size());

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/structure/disjoint_sets.h"
-#include "core/structure/point_grid.h"
+#include "core/structure/points.h"
 #include "stages/group_classes/persistence/moves.h"
 
 namespace cairn::group_classes {

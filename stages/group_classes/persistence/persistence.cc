@@ -6,7 +6,7 @@
 #include <map>
 
 #include "core/base/parallel.h"
-#include "core/structure/point_grid.h"
+#include "core/structure/points.h"
 #include "stages/group_classes/persistence/changes.h"
 #include "stages/group_classes/persistence/sightings.h"
 #include "stages/group_classes/persistence/surroundings.h"

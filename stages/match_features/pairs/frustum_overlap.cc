@@ -10,7 +10,7 @@
 
 #include "core/base/parallel.h"
 #include "core/features/wide_clones.h"
-#include "core/structure/point_grid.h"
+#include "core/structure/points.h"
 
 namespace cairn::match_features {
 namespace {
