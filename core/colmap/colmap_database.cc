@@ -195,6 +195,16 @@ Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database,
   return keypoints;
 }
 
+Result<int> ReadNumDescriptors(SQLite::Database& database, ImageId image_id) {
+  SQLite::Statement query(database, "SELECT rows FROM descriptors WHERE image_id = ?");
+  query.bind(1, image_id);
+  if (!query.executeStep()) return 0;
+  RowReader row(query);
+  const int64_t rows = row.Integer(0, 0, kMaxKeypoints);
+  if (!row.ok()) return BadRow(database, "descriptors", image_id, row.problem());
+  return static_cast<int>(rows);
+}
+
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,
                                                  const DescriptorKind& kind) {
   // COLMAP 4.0 says what extracted them: 0 is SIFT.

@@ -76,6 +76,7 @@ Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database
 // A keypoint of an affine shape a11 a12 a21 a22, as COLMAP's FeatureKeypoint has its scale and orientation.
 Keypoint KeypointOfShape(float x, float y, const float* shape);
 Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
+Result<int> ReadNumDescriptors(SQLite::Database& database, ImageId image_id);
 // Of this kind, which the database says (ReadDescriptorKind).
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id,
                                                  const DescriptorKind& kind = {});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <unordered_map>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -14,57 +15,99 @@ namespace {
 // Stream of the seed; the other streams grow the tree.
 constexpr uint64_t kSampleStream = 0;
 
-// `count` of the numbers below `total`, drawn without repetition, ascending.
+// Images whose descriptors are in memory at once.
+constexpr size_t kNumImagesAtOnce = 256;
+
+// `count` of the numbers below `total`, or all, drawn without repetition, ascending: the first of all numbers
+// after each of them has changed places with one at random [Fisher-Yates], of which only those that are no
+// longer at their own are kept.
 std::vector<int64_t> Draw(int64_t total, int64_t count, uint64_t seed) {
-  std::vector<int64_t> numbers(total);
-  std::iota(numbers.begin(), numbers.end(), int64_t{0});
-  if (count >= total) return numbers;
+  std::vector<int64_t> numbers;
+  if (count >= total) {
+    numbers.resize(total);
+    std::iota(numbers.begin(), numbers.end(), int64_t{0});
+    return numbers;
+  }
   Random random(seed);
-  for (int64_t i = 0; i < count; ++i) std::swap(numbers[i], numbers[random.UniformInt(i, total - 1)]);
-  numbers.resize(count);
+  std::unordered_map<int64_t, int64_t> moved;  // by the place where it is
+  const auto take = [&](int64_t place) {
+    const auto found = moved.find(place);
+    return found == moved.end() ? place : found->second;
+  };
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t place = random.UniformInt(i, total - 1);
+    numbers.push_back(take(place));
+    moved[place] = take(i);
+  }
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
 
-DescriptorMatrix TrainingDescriptors(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
-                                     int64_t num_descriptors, int max_num_training_descriptors,
-                                     uint64_t seed) {
+Result<DescriptorMatrix> ReadImage(const DescriptorSource& images, size_t i) {
+  CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors, images.read(i));
+  if (descriptors.rows() != images.num_descriptors[i]) {
+    return MakeError(ErrorCode::kCorrupt, "build_vocabulary: image {} has {} descriptors, expected {}",
+                     images.image_ids[i], descriptors.rows(), images.num_descriptors[i]);
+  }
+  return descriptors;
+}
+
+Result<DescriptorMatrix> TrainingDescriptors(const DescriptorSource& images, const DescriptorKind& kind,
+                                             int64_t num_descriptors, int max_num_training_descriptors,
+                                             uint64_t seed, Progress& progress) {
   const std::vector<int64_t> drawn =
       Draw(num_descriptors, max_num_training_descriptors, MixSeed(seed, kSampleStream));
   DescriptorMatrix training(static_cast<Eigen::Index>(drawn.size()), kind.num_values);
-  size_t image = 0;
+  progress.Begin("reading descriptors", std::ssize(images.image_ids), "images");
   int64_t first = 0;  // number of the image's first descriptor
-  for (size_t i = 0; i < drawn.size(); ++i) {
-    while (drawn[i] >= first + images[image].descriptors.rows()) first += images[image++].descriptors.rows();
-    training.row(i) = images[image].descriptors.row(drawn[i] - first);
+  size_t next = 0;
+  for (size_t image = 0; image < images.image_ids.size(); ++image) {
+    const int64_t end = first + images.num_descriptors[image];
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading descriptors");
+    if (next < drawn.size() && drawn[next] < end) {
+      CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors, ReadImage(images, image));
+      for (; next < drawn.size() && drawn[next] < end; ++next)
+        training.row(static_cast<Eigen::Index>(next)) = descriptors.row(drawn[next] - first);
+    }
+    first = end;
+    progress.Advance();
   }
+  progress.End();
   return training;
 }
 
-void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_document_ratio,
-                       int num_threads, Progress& progress, Vocabulary* vocabulary) {
-  std::vector<std::vector<WordIdx>> words(images.size());  // ascending
-  progress.Begin("filling inverted files", static_cast<int64_t>(images.size()), "images");
-  ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
-    words[i] = QuantizeDescriptors(*vocabulary, images[i].descriptors);
-    progress.Advance();
-  });
-  progress.End();
-  for (size_t i = 0; i < images.size(); ++i) {
-    vocabulary->document_ids.push_back(images[i].image_id);
-    for (const WordIdx word : words[i]) {
-      // [Mariottini11 §IV] the word's inverted file: the images that have it, and how often
-      std::vector<Posting>& postings = vocabulary->inverted_files[word];
-      if (postings.empty() || postings.back().document != static_cast<int32_t>(i)) {
-        postings.push_back({static_cast<int32_t>(i), 0});
+Status FillInvertedFiles(const DescriptorSource& images, double max_document_ratio, int num_threads,
+                         Progress& progress, Vocabulary* vocabulary) {
+  const size_t num_images = images.image_ids.size();
+  progress.Begin("filling inverted files", static_cast<int64_t>(num_images), "images");
+  for (size_t begin = 0; begin < num_images; begin += kNumImagesAtOnce) {
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while filling inverted files");
+    std::vector<DescriptorMatrix> descriptors;
+    for (size_t i = begin; i < std::min(begin + kNumImagesAtOnce, num_images); ++i) {
+      CAIRN_ASSIGN_OR_RETURN(descriptors.emplace_back(), ReadImage(images, i));
+    }
+    std::vector<std::vector<WordIdx>> words(descriptors.size());  // ascending
+    ParallelFor(std::ssize(descriptors), num_threads, [&](int64_t i) {
+      words[i] = QuantizeDescriptors(*vocabulary, descriptors[i]);
+      progress.Advance();
+    });
+    for (size_t i = 0; i < words.size(); ++i) {
+      const auto document = static_cast<int32_t>(begin + i);
+      vocabulary->document_ids.push_back(images.image_ids[begin + i]);
+      for (const WordIdx word : words[i]) {
+        // [Mariottini11 §IV] the word's inverted file: the images that have it, and how often
+        std::vector<Posting>& postings = vocabulary->inverted_files[word];
+        if (postings.empty() || postings.back().document != document) postings.push_back({document, 0});
+        ++postings.back().count;
       }
-      ++postings.back().count;
     }
   }
-  const double max_length = max_document_ratio * static_cast<double>(images.size());
+  progress.End();
+  const double max_length = max_document_ratio * static_cast<double>(num_images);
   for (std::vector<Posting>& postings : vocabulary->inverted_files) {
     if (static_cast<double>(postings.size()) > max_length) postings = {};  // [Mariottini11 §VII-A] stop list
   }
+  return Ok();
 }
 
 }  // namespace
@@ -115,23 +158,24 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
   return table;
 }
 
-Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
+Result<Vocabulary> BuildVocabulary(const DescriptorSource& images, const DescriptorKind& kind,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
                                    Progress& progress, const Vocabulary* tree) {
   BuildVocabularyOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   int64_t num_descriptors = 0;
-  for (size_t i = 0; i < images.size(); ++i) {
-    if (i > 0 && images[i].image_id <= images[i - 1].image_id) {
+  const std::vector<ImageId>& ids = images.image_ids;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (i > 0 && ids[i] <= ids[i - 1]) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "build_vocabulary: image {} after image {}; expected ascending ids",
-                       images[i].image_id, images[i - 1].image_id);
+                       "build_vocabulary: image {} after image {}; expected ascending ids", ids[i],
+                       ids[i - 1]);
     }
-    num_descriptors += images[i].descriptors.rows();
+    num_descriptors += images.num_descriptors[i];
   }
   if (num_descriptors == 0) {
     return MakeError(ErrorCode::kNoData,
-                     "build_vocabulary: no descriptors in {} images; are the images blank?", images.size());
+                     "build_vocabulary: no descriptors in {} images; are the images blank?", ids.size());
   }
   Vocabulary vocabulary;
   if (tree != nullptr) {
@@ -143,14 +187,28 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, 
     vocabulary.centres = tree->centres;
     CAIRN_RETURN_IF_ERROR(NumberVocabularyNodes(&vocabulary));
   } else {
-    const DescriptorMatrix training =
-        TrainingDescriptors(images, kind, num_descriptors, options.max_num_training_descriptors, seed);
+    CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix training,
+                           TrainingDescriptors(images, kind, num_descriptors,
+                                               options.max_num_training_descriptors, seed, progress));
     CAIRN_ASSIGN_OR_RETURN(vocabulary, GrowVocabulary(training, kind, num_descriptors, options.tree, seed,
                                                       num_threads, progress));
   }
-  FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary);
+  CAIRN_RETURN_IF_ERROR(
+      FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary));
   WeightVocabulary(&vocabulary);
   return vocabulary;
+}
+
+Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
+                                   const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
+                                   Progress& progress, const Vocabulary* tree) {
+  DescriptorSource source;
+  for (const ImageDescriptors& image : images) {
+    source.image_ids.push_back(image.image_id);
+    source.num_descriptors.push_back(static_cast<int>(image.descriptors.rows()));
+  }
+  source.read = [&](size_t i) -> Result<DescriptorMatrix> { return images[i].descriptors; };
+  return BuildVocabulary(source, kind, options, seed, num_threads, progress, tree);
 }
 
 }  // namespace cairn::build_vocabulary

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,12 +41,24 @@ struct ImageDescriptors {
   DescriptorMatrix descriptors;
 };
 
-// With a tree, its words are used and none is grown; its documents are ignored.  Pure: no files, no clock;
-// the same tree for any number of threads (all sums are of integers).  An image without descriptors is a
-// document without words.  If all descriptors are equal, the tree is one word; with fewer distinct
-// descriptors than branches, each is a word.  Cost: training descriptors * depth * rounds * branching dot
-// products.  Errors: InvalidArgument (an option; images not in ascending order), NoData (no
-// descriptors), Cancelled.
+// A survey's descriptors that are read image by image, twice: those of a large one do not fit into memory.
+struct DescriptorSource {
+  std::vector<ImageId> image_ids;    // ascending
+  std::vector<int> num_descriptors;  // per image
+  // Those of an image, by its index; is called by one thread at a time.
+  std::function<Result<DescriptorMatrix>(size_t)> read;
+};
+
+// With a tree, its words are used and none is grown; its documents are ignored.  No clock, and no files but
+// what the source reads; the same tree for any number of threads (all sums are of integers).  An image
+// without descriptors is a document without words.  If all descriptors are equal, the tree is one word; with
+// fewer distinct descriptors than branches, each is a word.  Cost: training descriptors * depth * rounds *
+// branching dot products.  Memory: the training descriptors, and eight bytes for each word of an image.
+// Errors: InvalidArgument (an option; images not in ascending order), NoData (no descriptors), Cancelled; the
+// source's.
+Result<Vocabulary> BuildVocabulary(const DescriptorSource& images, const DescriptorKind& kind,
+                                   const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
+                                   Progress& progress, const Vocabulary* tree = nullptr);
 Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images, const DescriptorKind& kind,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
                                    Progress& progress, const Vocabulary* tree = nullptr);

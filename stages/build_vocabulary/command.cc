@@ -1,9 +1,12 @@
 #include "stages/build_vocabulary/command.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "core/capture/capture.h"
@@ -15,8 +18,19 @@
 namespace cairn::build_vocabulary {
 namespace {
 
-// Bytes of memory per byte of the input file.
-constexpr double kMemoryPerFileByte = 1.5;
+// Bytes of memory per byte of the input file: of a large one, words are kept and no descriptors but those
+// that train the tree (bench/scale/README.md).
+constexpr double kMemoryPerFileByte = 1.5, kMemoryPerLargeFileByte = 0.15, kFixedMemory = 300.0 * (1 << 20);
+
+Status CheckMemoryForFeatures(const std::string& path, int64_t memory_mib) {
+  std::error_code error;
+  const auto file = static_cast<double>(std::filesystem::file_size(path, error));
+  if (error) return Ok();  // its reader says what is wrong
+  return CheckMemory(fmt::format("learning the words of {}", path),
+                     static_cast<int64_t>(
+                         std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory)),
+                     memory_mib);
+}
 
 struct Arguments {
   std::string features_path;
@@ -26,23 +40,21 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// `survey`: names of the images to read; empty: all.
-Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path,
-                                                      const std::optional<std::set<std::string>>& survey,
-                                                      DescriptorKind* kind) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
-  return WithDatabaseErrors(path, [&]() -> Result<std::vector<ImageDescriptors>> {
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> database_images, ReadDatabaseImages(database));
-    CAIRN_ASSIGN_OR_RETURN(*kind, ReadDescriptorKind(database, path));
-    std::vector<ImageDescriptors> images;
-    for (const DatabaseImage& image : database_images) {
-      if (survey && survey->count(image.name) == 0) continue;
-      CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors,
-                             ReadDatabaseDescriptors(database, image.image_id, *kind));
-      images.push_back({image.image_id, std::move(descriptors)});
-    }
-    return images;
-  });
+// What the database has of the images of the survey; all, where there is none.
+Result<DescriptorSource> OpenDescriptors(SQLite::Database& database, const DescriptorKind& kind,
+                                         const std::optional<std::set<std::string>>& survey) {
+  DescriptorSource source;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadDatabaseImages(database));
+  for (const DatabaseImage& image : images) {
+    if (survey && survey->count(image.name) == 0) continue;
+    CAIRN_ASSIGN_OR_RETURN(const int num_descriptors, ReadNumDescriptors(database, image.image_id));
+    source.image_ids.push_back(image.image_id);
+    source.num_descriptors.push_back(num_descriptors);
+  }
+  source.read = [&database, kind, ids = source.image_ids](size_t i) {
+    return ReadDatabaseDescriptors(database, ids[i], kind);
+  };
+  return source;
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -53,21 +65,22 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     survey.emplace();
     for (const CaptureImage& image : capture.images) survey->insert(image.name);
   }
-  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("learning the words", arguments.features_path, kMemoryPerFileByte,
-                                           environment.memory_mib));
-  DescriptorKind kind;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
-                         ReadDescriptors(arguments.features_path, survey, &kind));
+  const std::string& path = arguments.features_path;
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFeatures(path, environment.memory_mib));
   std::optional<Vocabulary> tree;
   if (!arguments.options.tree_from.empty()) {
     CAIRN_ASSIGN_OR_RETURN(tree, ReadVocabulary(arguments.options.tree_from));
   }
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
   CAIRN_ASSIGN_OR_RETURN(
-      const Vocabulary vocabulary,
-      BuildVocabulary(images, kind, arguments.options, environment.seed, environment.num_threads,
-                      *environment.progress, tree ? &*tree : nullptr));
+      const Vocabulary vocabulary, WithDatabaseErrors(path, [&]() -> Result<Vocabulary> {
+        CAIRN_ASSIGN_OR_RETURN(const DescriptorKind kind, ReadDescriptorKind(database, path));
+        CAIRN_ASSIGN_OR_RETURN(const DescriptorSource images, OpenDescriptors(database, kind, survey));
+        return BuildVocabulary(images, kind, arguments.options, environment.seed, environment.num_threads,
+                               *environment.progress, tree ? &*tree : nullptr);
+      }));
   CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
-  environment.report->in = {{"images", static_cast<int64_t>(images.size())}};
+  environment.report->in = {{"images", std::ssize(vocabulary.document_ids)}};
   environment.report->out = {{"words", vocabulary.num_words()}};
   *environment.out << fmt::format("build_vocabulary: {} words of depth {} over {} images\n",
                                   vocabulary.num_words(), vocabulary.depth, vocabulary.document_ids.size());

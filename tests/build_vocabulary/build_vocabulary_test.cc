@@ -1,6 +1,9 @@
 #include "stages/build_vocabulary/build_vocabulary.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
+#include <numeric>
 #include <set>
 
 #include <gmock/gmock.h>
@@ -191,6 +194,86 @@ TEST(BuildVocabulary, OptionOutsideItsRangeIsAnError) {
   BuildVocabularyOptions options;
   options.tree.branching = 1;
   EXPECT_EQ(Build(RandomImages(1, 10, 1), options).error().code, ErrorCode::kInvalidArgument);
+}
+
+// As a source that is read image by image has them.
+DescriptorSource SourceOf(const std::vector<ImageDescriptors>& images) {
+  DescriptorSource source;
+  for (const ImageDescriptors& image : images) {
+    source.image_ids.push_back(image.image_id);
+    source.num_descriptors.push_back(static_cast<int>(image.descriptors.rows()));
+  }
+  source.read = [&images](size_t i) -> Result<DescriptorMatrix> { return images[i].descriptors; };
+  return source;
+}
+
+TEST(BuildVocabulary, OfMoreImagesThanAreReadAtOnceEachIsADocument) {
+  const std::vector<ImageDescriptors> images = RandomImages(600, 5, 3);
+  NoProgress progress;
+  const Vocabulary vocabulary = *BuildVocabulary(SourceOf(images), {}, {}, 7, 2, progress);
+  EXPECT_EQ(FileBytes(vocabulary, "source.db"), FileBytes(*Build(images, {}), "images.db"));
+  ASSERT_EQ(vocabulary.document_ids.size(), 600u);
+  std::vector<std::map<int32_t, int32_t>> expected(vocabulary.num_words());
+  for (int32_t i = 0; i < 600; ++i) {
+    EXPECT_EQ(vocabulary.document_ids[i], images[i].image_id);
+    for (int row = 0; row < 5; ++row)
+      ++expected[QuantizeDescriptor(vocabulary, images[i].descriptors.row(row).data())][i];
+  }
+  for (int word = 0; word < vocabulary.num_words(); ++word) {
+    std::map<int32_t, int32_t> found;
+    for (const Posting& posting : vocabulary.inverted_files[word]) found[posting.document] = posting.count;
+    EXPECT_EQ(found, expected[word]);
+    EXPECT_EQ(found.size(), vocabulary.inverted_files[word].size());
+  }
+}
+
+TEST(BuildVocabulary, TrainsWithDescriptorsDrawnFromAll) {
+  const std::vector<ImageDescriptors> images = RandomImages(7, 40, 3);
+  BuildVocabularyOptions options;
+  options.max_num_training_descriptors = 100;
+  const uint64_t seed = 7;
+  // All numbers, the first hundred of which change places with others.
+  std::vector<int> numbers(280);
+  std::iota(numbers.begin(), numbers.end(), 0);
+  Random random(MixSeed(seed, 0));
+  for (int i = 0; i < 100; ++i) std::swap(numbers[i], numbers[random.UniformInt(i, 279)]);
+  numbers.resize(100);
+  std::sort(numbers.begin(), numbers.end());
+  DescriptorMatrix training(100, kSiftDescriptorDim);
+  for (int i = 0; i < 100; ++i) training.row(i) = images[numbers[i] / 40].descriptors.row(numbers[i] % 40);
+  NoProgress progress;
+  const Vocabulary expected = *GrowVocabulary(training, {}, 280, options.tree, seed, 1, progress);
+  const Vocabulary found = *Build(images, options, 2, seed);
+  EXPECT_EQ(found.centres, expected.centres);
+  // As many as there are, all of them.
+  options.max_num_training_descriptors = 280;
+  EXPECT_EQ(Build(images, options)->centres, Build(images, {})->centres);
+  options.max_num_training_descriptors = 279;
+  EXPECT_NE(Build(images, options)->centres, Build(images, {})->centres);
+}
+
+TEST(BuildVocabulary, WhatASourceCannotReadIsItsError) {
+  const std::vector<ImageDescriptors> images = RandomImages(300, 5, 3);
+  NoProgress progress;
+  for (const size_t unreadable : {0, 2, 299}) {
+    DescriptorSource source = SourceOf(images);
+    source.read = [&](size_t i) -> Result<DescriptorMatrix> {
+      if (i == unreadable) return MakeError(ErrorCode::kIo, "image {} is gone", i);
+      return images[i].descriptors;
+    };
+    const Result<Vocabulary> vocabulary = BuildVocabulary(source, {}, {}, 7, 2, progress);
+    ASSERT_FALSE(vocabulary.ok());
+    EXPECT_EQ(vocabulary.error().code, ErrorCode::kIo);
+    // With a tree only the second reading is left.
+    const Vocabulary tree = *Build(images, {});
+    EXPECT_EQ(BuildVocabulary(source, {}, {}, 7, 2, progress, &tree).error().code, ErrorCode::kIo);
+  }
+  DescriptorSource longer = SourceOf(images);
+  longer.num_descriptors[4] = 6;
+  const Result<Vocabulary> vocabulary = BuildVocabulary(longer, {}, {}, 7, 2, progress);
+  ASSERT_FALSE(vocabulary.ok());
+  EXPECT_EQ(vocabulary.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(vocabulary.error().message, testing::HasSubstr("image 50 has 5 descriptors, expected 6"));
 }
 
 TEST(BuildVocabulary, SubsampledTrainingStillFilesEveryDescriptor) {

@@ -95,7 +95,9 @@ class ColmapDatabase : public testing::Test {
       CAIRN_ASSIGN_OR_RETURN(const auto images, ReadDatabaseImages(*database));
       for (const DatabaseImage& image : images) {
         CAIRN_RETURN_IF_ERROR(ReadDatabaseKeypoints(*database, image.image_id));
-        CAIRN_RETURN_IF_ERROR(ReadDatabaseDescriptors(*database, image.image_id));
+        CAIRN_ASSIGN_OR_RETURN(const int num_descriptors, ReadNumDescriptors(*database, image.image_id));
+        CAIRN_ASSIGN_OR_RETURN(const auto descriptors, ReadDatabaseDescriptors(*database, image.image_id));
+        EXPECT_EQ(num_descriptors, descriptors.rows());
       }
       CAIRN_RETURN_IF_ERROR(ReadDatabaseTwoViewGeometries(*database, 1));
       return Ok();
