@@ -1,6 +1,7 @@
 #include "stages/group_classes/command.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -8,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/parallel.h"
 #include "core/capture/sessions.h"
+#include "core/colmap/colmap_database.h"
 #include "core/line/memory.h"
 #include "stages/group_classes/adjust/solved_file.h"
 #include "stages/group_classes/group_classes.h"
@@ -21,18 +24,41 @@ namespace {
 // or, of a survey of few images, per byte of the file.
 constexpr double kMemoryPerFileByte = 0.8, kMemoryPerLargeFileByte = 0.15, kFixedMemory = 600.0 * (1 << 20);
 constexpr double kMemoryPerImageAdjusted = 150e3, kMemoryPerFileByteAdjusted = 0.8;
+// Keypoints of an image with which that was measured.
+constexpr int kNumKeypointsAdjusted = 100;
 
-// What grouping takes.  `num_adjusted`: images whose poses are adjusted at once.
-Status CheckMemoryForMatches(const std::string& matches, size_t num_adjusted, int64_t memory_mib) {
+// Images whose poses are adjusted at the same time, at most, weighed by their keypoints.
+double NumAdjustedAtOnce(const Capture& capture, int64_t num_images, const GroupClassesOptions& options,
+                         int num_threads) {
+  const bool is_reconstructed = capture.frame && capture.frame->is_reconstructed;
+  if (options.refine_poses == "never" || (options.refine_poses == "auto" && is_reconstructed)) return 0;
+  const AdjustSurveyOptions& adjustment = options.adjustment;
+  const int64_t in_parts = int64_t{NumThreads(num_threads)} * adjustment.num_images_at_once / 3;
+  const int64_t at_once =
+      std::max({int64_t{adjustment.num_images_together}, in_parts, int64_t{adjustment.num_images_learnt}});
+  const double weight = static_cast<double>(adjustment.num_keypoints_adjusted) / kNumKeypointsAdjusted;
+  return static_cast<double>(std::min(num_images, at_once)) * std::max(1.0, weight);
+}
+
+// Refuses what grouping has no room for.
+Status CheckMemoryForMatches(const std::string& matches, double num_adjusted, int64_t memory_mib) {
   std::error_code error;
   const auto file = static_cast<double>(std::filesystem::file_size(matches, error));
   if (error) return Ok();  // its reader says what is wrong
   const double unadjusted =
       std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory);
-  const double adjusting = std::min(kMemoryPerImageAdjusted * static_cast<double>(num_adjusted),
-                                    kMemoryPerFileByteAdjusted * file);
+  const double adjusting =
+      std::min(kMemoryPerImageAdjusted * num_adjusted, kMemoryPerFileByteAdjusted * file);
   return CheckMemory(fmt::format("grouping the matches of {}", matches),
                      static_cast<int64_t>(unadjusted + adjusting), memory_mib);
+}
+
+Result<int64_t> CountImages(const std::string& matches) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches));
+  return WithDatabaseErrors(matches, [&]() -> Result<int64_t> {
+    CAIRN_ASSIGN_OR_RETURN(const auto images, ReadDatabaseImages(database));
+    return std::ssize(images);
+  });
 }
 
 struct Arguments {
@@ -134,15 +160,15 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   const GroupClassesOptions& options = arguments.options;
-  const size_t num_adjusted =
-      options.refine_poses == "never"
-          ? 0
-          : std::min(capture.images.size(), static_cast<size_t>(options.adjustment.num_images_together));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t num_images, CountImages(arguments.matches));
+  const double num_adjusted = NumAdjustedAtOnce(capture, num_images, options, environment.num_threads);
   Status fits = CheckMemoryForMatches(arguments.matches, num_adjusted, environment.memory_mib);
   if (!fits.ok() && CheckMemoryForMatches(arguments.matches, 0, environment.memory_mib).ok()) {
-    return MakeError(fits.error().code,
-                     "{}; most of it is for adjusting poses: with --refine-poses never it fits",
-                     fits.error().message);
+    return MakeError(
+        fits.error().code,
+        "{}; adjusting poses takes a part of it: a smaller --num-images-together takes less, and "
+        "with --refine-poses never it fits",
+        fits.error().message);
   }
   CAIRN_RETURN_IF_ERROR(std::move(fits));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));

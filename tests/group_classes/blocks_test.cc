@@ -70,6 +70,18 @@ TEST(Blocks, HaveEveryImageOnceAndOtherBordersInEachRound) {
   EXPECT_EQ(rounds.size(), 3u);
 }
 
+TEST(Blocks, AreOfPosesAsTheyAreByNow) {
+  // Stated in a row, found in two heaps.
+  Row row = MakeRow(20);
+  for (int i = 0; i < 20; ++i) row.posed.poses[i].translation.x() = i % 2 == 0 ? 0.01 * i : 50 + 0.01 * i;
+  const std::vector<int32_t> first = BlocksOfRound(row.posed, 1, 12).front();
+  const auto is_odd = [](int32_t i) {
+    return i % 2 == 1;
+  };  // those have the larger x, and the smaller center
+  EXPECT_GT(std::count_if(first.begin(), first.end(), is_odd), 7);
+  EXPECT_NE(BlocksOfRound(row.posed, 1, 12), BlocksOfRound(MakeRow(20).posed, 1, 12));
+}
+
 TEST(Blocks, SeeTheTracksOfTheirImages) {
   const std::vector<Track> tracks = {{{0, 1}, {1, 1}, {3, 1}}, {{2, 2}, {3, 2}}, {{1, 3}, {4, 3}}};
   EXPECT_THAT(TracksOfBlocks(tracks, {{0, 1}, {2, 3}}, 5), ElementsAre(ElementsAre(0, 2), ElementsAre(0, 1)));
@@ -132,7 +144,7 @@ TEST(Blocks, SeeNothingOfImagesThatAreNotThere) {
 }
 
 TEST(Blocks, TakeWhatTheirOwnImagesWant) {
-  // Images of the block want one keypoint each: the tracks of images 4 and 6 are enough for image 5.
+  // Images of the block want one keypoint each.
   const Row row = MakeRow(20);
   const std::vector<int32_t> images = {4, 5, 6};
   const auto tracks_of = TracksOfBlocks(row.tracks, {images}, 20);

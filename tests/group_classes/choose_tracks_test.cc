@@ -1,4 +1,4 @@
-#include "stages/group_classes/adjust/choose_tracks.h"
+#include "stages/group_classes/tracks/choose_tracks.h"
 
 #include <numeric>
 

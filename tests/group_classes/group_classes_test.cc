@@ -286,6 +286,16 @@ TEST(GroupClasses, DriftIsStraightenedBlockByBlock) {
   }
 }
 
+// Where nothing was straightened in parts before, the second run is right only as it moves along with the
+// first one.
+TEST(GroupClasses, WhatFollowsARunOfABlockMovesAlong) {
+  const Survey survey = MakeSurvey({.walk_m = 0.025, .walk_deg = 1});
+  GroupClassesOptions options;
+  options.adjustment.num_images_together = 12;
+  const Classes in_blocks = Group(survey, options).classes;
+  EXPECT_LT(MeanErrorDeg(survey, in_blocks, false), 0.1 * MeanErrorDeg(survey, in_blocks, true));
+}
+
 TEST(GroupClasses, OffsetAndFocalLengthAreThoseOfAllBlocks) {
   SurveyNoise noise{.pose_m = 0.002, .pose_deg = 0.05, .focal_ratio = 1.02};
   noise.offset.translation = Eigen::Vector3d(0.04, -0.01, 0.02);

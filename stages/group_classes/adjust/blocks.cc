@@ -6,8 +6,8 @@
 
 #include "core/base/random.h"
 #include "core/structure/points.h"
-#include "stages/group_classes/adjust/choose_tracks.h"
 #include "stages/group_classes/adjust/parts.h"
+#include "stages/group_classes/tracks/choose_tracks.h"
 
 namespace cairn::group_classes {
 
@@ -22,7 +22,7 @@ std::vector<std::vector<int32_t>> BlocksOfRound(const PosedImages& posed, int ro
     return runs;
   }
   std::vector<Eigen::Vector3d> centers;
-  for (const Pose& pose : posed.stated) centers.push_back(pose.Center());
+  for (const Pose& pose : posed.poses) centers.push_back(pose.Center());
   std::vector<int32_t> images(centers.size());
   std::iota(images.begin(), images.end(), 0);
   Random random(MixSeed(0, round));

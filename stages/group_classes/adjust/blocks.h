@@ -12,18 +12,19 @@ namespace cairn::group_classes {
 // A survey too large for all of its poses to be adjusted together is adjusted block by block; what is around
 // a block is fixed, and decides with it on what both see.
 //
-//   round 1: runs of successive images, the later ones not yet there. What follows a run moves along when it
+//   round 0: runs of successive images, the later ones not yet there. What follows a run moves along when it
 //            bends: it begins right where the run ends.
 //   then:    blocks of the world, of which each round has others, with all around them:
 //
-//            +--------+-----+            +-----+-----------+     An image at a border of one round is well
-//            |        |     |            |     +-----------+     within a block of another one.
+//            +--------+-----+            +-----+-----------+     An image at a border of one round is mostly
+//            |        |     |            |     +-----------+     well within a block of another one.
 //            |        +-----+            |     |           |
 //            +--------+-----+            +-----+-----------+
 //
-// Memory is that of a block, whatever the survey's size.
+// The solver's memory is that of a block with the images around it, whatever the survey's size.
 
-// The images of each block of a round, ascending: at most `most`.  Of round 0 they are runs, in their order.
+// The images of each block of a round, by where they are by now, ascending: at most `most`.  Of round 0 they
+// are runs, in their order.
 // REQUIRES: most >= 1
 std::vector<std::vector<int32_t>> BlocksOfRound(const PosedImages& posed, int round, int most);
 

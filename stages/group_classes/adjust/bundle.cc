@@ -207,7 +207,10 @@ class SchurBundle {
     }
     offset_block_ = add_pose(bundle_.camera_from_given);
     if (!bundle_.is_offset_free) problem_.SetConstant(offset_block_);
-    if (num_images_ > 0) problem_.SetConstant(Drifted(0));
+    // What holds the frame.
+    const auto is_fixed = [](const BundleProblem::Image& image) { return image.is_fixed; };
+    if (num_images_ > 0 && std::none_of(bundle_.images.begin(), bundle_.images.end(), is_fixed))
+      problem_.SetConstant(Drifted(0));
     for (CameraBlock& camera : bundle_.cameras) {
       const auto size = static_cast<int>(camera.free.size());
       camera_block_.push_back(size == 0 ? -1 : problem_.AddBlock(camera.delta.data(), size));

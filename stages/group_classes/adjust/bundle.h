@@ -110,7 +110,8 @@ Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Ob
 //   + sum_i |D_i D_i-1^-1 (G_i G_i-1^-1)^-1|^2 / (walk^2 way_i)            drift of the stated poses G_i
 //   + |O|^2 / offset^2 + |c - prior|^2 / sigma^2
 // with reprojection residuals r (core/camera/pixel_ray.h), which a camera changes as CameraSensitivity says.
-// D of the first image is fixed, and T and D of those that are.  Analytic derivatives, points eliminated
+// T and D of some images may be fixed, what depends on these alone is left out; where none are, D of the
+// first image is.  REQUIRES: no free offset with fixed images  Analytic derivatives, points eliminated
 // (core/structure/schur_solver.h). Returns whether it converged.  `evidence` may be null.
 bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence);
 

@@ -29,7 +29,7 @@ std::vector<int> BeginsOfParts(int num_images, int num_parts);
 // REQUIRES: tracks in the order of their images
 std::vector<std::vector<Track>> SplitTracks(const std::vector<Track>& tracks, const std::vector<int>& begins);
 
-// Of successive images: poses, and the stated ones freed from drift.
+// Of the images of a part: poses, and the stated ones freed from drift.
 struct PosesOfPart {
   std::vector<Pose> poses, drifted;
 };

@@ -22,8 +22,9 @@ constexpr int kNumDepths = 5;
 // taken.
 constexpr int kNumBorderPixels = 16;
 constexpr double kConeMargin_deg = 2;
-// By how much a sample may miss a limit, as part of it: what stands exactly on one, as many do between the
-// stations of a lattice, counts however the last bits are rounded, which is another matter on each processor.
+// By how much a sample may miss a limit, as part of it, and of the angle's squared cosine: what stands
+// exactly on one, as many do between the stations of a lattice, counts however the last bits are rounded,
+// which is another matter on each processor.
 constexpr double kSlack = 1e-9;
 
 // x² with the sign of x: compares cosines without a square root.
@@ -68,7 +69,8 @@ double ConeSquare(const Camera& camera) {
       look(side * camera.width, part * camera.height);
     }
   }
-  return SignedSquare(std::cos(std::min(std::numbers::pi, largest_rad + RadFromDeg(kConeMargin_deg))));
+  return SignedSquare(std::cos(std::min(std::numbers::pi, largest_rad + RadFromDeg(kConeMargin_deg)))) -
+         kSlack;
 }
 
 SampledCamera Sample(const Camera& camera, const FrustumOverlapOptions& options) {
