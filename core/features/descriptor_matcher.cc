@@ -183,7 +183,11 @@ PooledVector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
                                      const DescriptorMatcherOptions& options) {
   PooledVector<BestTwo> rows, columns;
   FindBestTwo(descriptors1, descriptors2, &rows, &columns);
-  const DescriptorSpace& space = descriptors1.space();
+  return SelectMatches(rows, columns, descriptors1.space(), options);
+}
+
+PooledVector<Match> SelectMatches(const PooledVector<BestTwo>& rows, const PooledVector<BestTwo>& columns,
+                                  const DescriptorSpace& space, const DescriptorMatcherOptions& options) {
   const int32_t least_dot = LeastDotWithin(options.max_angle_rad, space);
   const auto passes = [&](const BestTwo& b) {
     if (b.best < least_dot) return false;

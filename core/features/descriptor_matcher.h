@@ -38,6 +38,10 @@ struct BestTwo {
   int32_t best = -1;
   int32_t second = -1;
 };
+// Of the best two of 2 for every descriptor of 1 (rows) and of 1 for every one of 2 (columns), those that
+// pass.
+PooledVector<Match> SelectMatches(const PooledVector<BestTwo>& rows, const PooledVector<BestTwo>& columns,
+                                  const DescriptorSpace& space, const DescriptorMatcherOptions& options);
 // Best two of 2 for every descriptor of 1 (rows), and best two of 1 for every one of 2 (columns), in one
 // sweep.  REQUIRES: both packed for the same kernel and space.
 void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,

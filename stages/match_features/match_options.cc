@@ -86,6 +86,13 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
 
 OptionTable DescribeOptions(MatchPairsOptions* o) {
   OptionTable table = {
+      {.name = "search",
+       .value = &o->search,
+       .help =
+           "exact: each descriptor is compared with all of the other image; approximate: with those that "
+           "FLANN's trees or hashes offer, which misses some matches; auto: approximate where it is faster, "
+           "between images of some 400000 features",
+       .choices = {"auto", "exact", "approximate"}},
       {.name = "max_ratio",
        .value = &o->matcher.max_ratio,
        .help = "largest ratio of the angles to the best and second best descriptor",

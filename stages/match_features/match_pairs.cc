@@ -37,10 +37,28 @@ bool IsGuided(const MatchImage& image, const VerifyPairOptions& options) {
   return options.guided_matching == "all" || (options.guided_matching == "posed" && image.cam_from_world);
 }
 
+// Whether a pair of so many features is searched by indices.
+bool IsSearchedByIndex(int64_t size1, int64_t size2, const DescriptorKind& kind, const std::string& search) {
+  return search == "approximate" || (search == "auto" && IsApproximateFaster(size1, size2, kind.space()));
+}
+
+// Per image.
+std::vector<NeededFeatures> NeededOfImages(const MatchImages& images, const MatchPairsOptions& options) {
+  int most = 0;
+  for (const MatchImage& image : images.images) most = std::max(most, image.num_features);
+  std::vector<NeededFeatures> needed;
+  for (const MatchImage& image : images.images) {
+    needed.push_back({IsGuided(image, options.verification),
+                      IsSearchedByIndex(image.num_features, most, images.descriptor_kind, options.search)});
+  }
+  return needed;
+}
+
 // Features of all images of pairs [begin, end); those in `held` are not read again.
 Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImages& images,
-                                     const VerifyPairOptions& options, const IndexPairs& pairs, int64_t begin,
-                                     int64_t end, const FeaturesOfImages& held, const Progress& progress) {
+                                     const std::vector<NeededFeatures>& needed, const IndexPairs& pairs,
+                                     int64_t begin, int64_t end, const FeaturesOfImages& held,
+                                     const Progress& progress) {
   FeaturesOfImages result;
   for (int64_t i = begin; i < end; ++i) {
     for (const int idx : {pairs[i].first, pairs[i].second}) {
@@ -53,7 +71,7 @@ Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImag
       const MatchImage& image = images.images[idx];
       CAIRN_ASSIGN_OR_RETURN(ImageFeatures features,
                              ReadImageFeatures(database, image, images.cameras.at(image.camera_id),
-                                               images.descriptor_kind, IsGuided(image, options)));
+                                               images.descriptor_kind, needed[idx]));
       result.emplace(idx, std::make_shared<const ImageFeatures>(std::move(features)));
     }
   }
@@ -81,7 +99,11 @@ MatchedPair MatchPair(const MatchImages& images, const std::pair<int, int>& pair
   const MatchImage& image2 = images.images[pair.second];
   const ImageFeatures& features1 = *features.at(pair.first);
   const ImageFeatures& features2 = *features.at(pair.second);
-  const PooledVector<Match> matches = MatchDescriptors(features1.packed, features2.packed, options.matcher);
+  const bool by_index =
+      IsSearchedByIndex(image1.num_features, image2.num_features, images.descriptor_kind, options.search);
+  const PooledVector<Match> matches =
+      by_index ? MatchApproximately(*features1.index, *features2.index, options.matcher)
+               : MatchDescriptors(features1.packed, features2.packed, options.matcher);
   MatchedPair result;
   result.num_putative = static_cast<int>(matches.size());
   result.geometry = VerifyPair(ForVerification(images, image1, features1),
@@ -125,23 +147,25 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
                   const TakeGeometry& take) {
   SortAlongCurve(&pairs);
   const int64_t budget = static_cast<int64_t>(options.memory_budget_mib) << 20;
+  const std::vector<NeededFeatures> needed = NeededOfImages(images, options);
   std::vector<int64_t> num_bytes;
-  for (const MatchImage& image : images.images)
-    num_bytes.push_back(ImageFeatures::NumBytes(image.num_features, images.descriptor_kind,
-                                                IsGuided(image, options.verification)));
+  for (size_t i = 0; i < needed.size(); ++i) {
+    num_bytes.push_back(
+        ImageFeatures::NumBytes(images.images[i].num_features, images.descriptor_kind, needed[i]));
+  }
   const std::vector<int64_t> ends = CutIntoStretches(pairs, num_bytes, budget / 2);
   FeaturesOfImages features;
   int64_t begin = 0;
   for (size_t stretch = 0; stretch < ends.size(); ++stretch) {
     if (stretch == 0) {
-      CAIRN_ASSIGN_OR_RETURN(
-          features, ReadStretch(database, images, options.verification, pairs, 0, ends[0], {}, progress));
+      CAIRN_ASSIGN_OR_RETURN(features,
+                             ReadStretch(database, images, needed, pairs, 0, ends[0], {}, progress));
     }
     std::future<Result<FeaturesOfImages>> next;
     if (stretch + 1 < ends.size()) {
       next = std::async(std::launch::async | std::launch::deferred, [&, stretch] {
-        return ReadStretch(database, images, options.verification, pairs, ends[stretch], ends[stretch + 1],
-                           features, progress);
+        return ReadStretch(database, images, needed, pairs, ends[stretch], ends[stretch + 1], features,
+                           progress);
       });
     }
     for (; begin < ends[stretch]; begin = std::min(begin + kBatchSize, ends[stretch])) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "core/base/error.h"
@@ -19,6 +20,10 @@ struct MatchPairsOptions {
   // when they are needed.  Two images are always held.  REQUIRES: >= 1
   int memory_budget_mib = 512;
   DescriptorMatcherOptions matcher;  // has the defaults of max_ratio and max_angle_rad
+  // "exact": each descriptor is compared with all of the other image.  "approximate": with those that FLANN
+  // offers (core/features/approximate_search.h), which misses some matches.  "auto": that where it is faster,
+  // between images of some 400,000 features.
+  std::string search = "auto";
   VerifyPairOptions verification;
 };
 // Without memory_budget_mib, which changes no result, like the number of threads.

@@ -54,6 +54,20 @@ TEST_F(MatchFeaturesTest, SameBytesForAnyMemoryBudget) {
   EXPECT_EQ(*HashFile(folder_ + "/matches.db"), all_in_memory);
 }
 
+TEST_F(MatchFeaturesTest, OfFewFeaturesAnIndexOffersAll) {
+  WriteFeatures(6);
+  ASSERT_TRUE(Match(true).ok());
+  const std::string by_default = *HashFile(folder_ + "/matches.db");
+  for (const char* search : {"exact", "approximate"}) {
+    options_.matching.search = search;
+    for (const int budget_mib : {1, 512}) {
+      options_.matching.memory_budget_mib = budget_mib;
+      ASSERT_TRUE(Match(true).ok());
+      EXPECT_EQ(*HashFile(folder_ + "/matches.db"), by_default) << search;
+    }
+  }
+}
+
 TEST_F(MatchFeaturesTest, FrustumGoesOnFromSeedsToThePairsTheyPredict) {
   // Each image with its two nearest first.  All see the same points, so that these pairs carry tracks from
   // the first image to the last.

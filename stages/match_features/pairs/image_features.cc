@@ -79,23 +79,25 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
   return result;
 }
 
-int64_t ImageFeatures::NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors) {
+int64_t ImageFeatures::NumBytes(int num_features, const DescriptorKind& kind, const NeededFeatures& needed) {
   const auto num = static_cast<size_t>(num_features);
-  const size_t num_values = has_descriptors ? kind.num_values : 0;
+  const size_t num_values = needed.descriptors ? kind.num_values : 0;
   return PackedDescriptors::NumBytes(num_features, kind.num_values) +
          static_cast<int64_t>(PooledSize(num * sizeof(Keypoint)) + num * sizeof(Eigen::Vector3d) +
-                              PooledSize(num * num_values));
+                              PooledSize(num * num_values)) +
+         (needed.index ? ApproximateIndex::NumBytes(num_features, kind.space()) : 0);
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
                                         const Camera& camera, const DescriptorKind& kind,
-                                        bool keep_descriptors) {
+                                        const NeededFeatures& needed) {
   ImageFeatures features;
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
   features.packed = PackedDescriptors(features.descriptors, kind.space());
   features.bearings = BearingsOf(features.keypoints, camera);
-  if (!keep_descriptors) features.descriptors = {};
+  if (needed.index) features.index.emplace(features.descriptors, kind.space());
+  if (!needed.descriptors) features.descriptors = {};
   return features;
 }
 

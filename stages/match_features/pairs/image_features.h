@@ -12,6 +12,7 @@
 #include "core/camera/camera.h"
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_database.h"
+#include "core/features/approximate_search.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/pose.h"
 
@@ -41,22 +42,28 @@ struct MatchImages {
 // keypoints and descriptors that differ).
 Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture);
 
+// What of an image's features is needed beside what all matching reads.
+struct NeededFeatures {
+  bool descriptors = false;  // unpacked ones
+  bool index = false;
+};
+
 // The features of one image, in the form that matching and verification use.
 struct ImageFeatures {
   PooledVector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
   DescriptorMatrix descriptors;           // for guided matching; without rows where there is none
   PackedDescriptors packed;
+  std::optional<ApproximateIndex> index;  // where they are not compared with all of another image
 
   // Upper limit of the memory that the features of an image take, bytes.
-  static int64_t NumBytes(int num_features, const DescriptorKind& kind, bool has_descriptors);
+  static int64_t NumBytes(int num_features, const DescriptorKind& kind, const NeededFeatures& needed);
 };
 
-// Unpacked descriptors are left out where `keep_descriptors` is false.  Errors: Corrupt.  Throws like
-// ReadMatchImages.
+// Errors: Corrupt.  Throws like ReadMatchImages.
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
                                         const Camera& camera, const DescriptorKind& kind,
-                                        bool keep_descriptors);
+                                        const NeededFeatures& needed);
 
 // Only the bearings of ImageFeatures.  Errors: Corrupt.  Throws like ReadMatchImages.
 Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
