@@ -53,6 +53,8 @@ TEST(Blocks, HaveEveryImageOnceAndOtherBordersInEachRound) {
   const Row row = MakeRow(100);
   std::set<std::vector<std::vector<int32_t>>> rounds;
   EXPECT_THAT(BlocksOfRound(row.posed, 0, 34), ElementsAre(SizeIs(33), SizeIs(33), SizeIs(34)));
+  EXPECT_THAT(BlocksOfRound(row.posed, 0, 33), ElementsAre(SizeIs(25), SizeIs(25), SizeIs(25), SizeIs(25)));
+  EXPECT_EQ(BlocksOfRound(row.posed, 0, 50).size(), 2u);
   for (int round = 0; round < 3; ++round) {
     const auto blocks = BlocksOfRound(row.posed, round, 30);
     EXPECT_EQ(BlocksOfRound(row.posed, round, 30), blocks);
