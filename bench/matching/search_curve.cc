@@ -4,12 +4,10 @@
 //   search_curve FEATURES.db... -- SIZE...      prints rows of a Markdown table for each number of
 //   descriptors that is searched
 //
-// The databases' images are shuffled; the first thousand descriptors of every hundredth image are the
-// queries, all of the others, as many as SIZE says, are searched.  Where there are fewer, more are made of
-// them: each a quarter of four of them, as another place might look. Recall: of the queries whose nearest is
-// nearer than 0.8 of the second, as the exact search has them, the part whose nearest is found.
-#include <sys/resource.h>
-
+// Of every hundredth image the descriptors are queries, a thousand of them at most, those of all others, as
+// many as SIZE says, are searched; both shuffled.  Where there are fewer, more are made of them: each a
+// quarter of four of them, as another place might look. Recall: of the queries whose nearest is nearer than
+// 0.8 of the second, as the exact search has them, the part whose nearest is found.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -27,6 +25,7 @@
 #include "core/features/approximate_search.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
+#include "core/line/memory.h"
 #include "core/vocabulary/grow_vocabulary.h"
 
 namespace cairn {
@@ -57,13 +56,13 @@ struct Descriptors {
 Descriptors ReadAll(const std::vector<std::string>& paths) {
   Descriptors all;
   Random random(1);
+  size_t num = 0;
   for (const std::string& path : paths) {
     auto database = OpenColmapDatabase(path);
     if (!database.ok()) {
       std::fprintf(stderr, "%s\n", database.error().message.c_str());
       std::exit(1);
     }
-    size_t num = 0;
     const std::vector<DatabaseImage> images = *ReadDatabaseImages(*database);
     for (const DatabaseImage& image : images) {
       const DescriptorMatrix descriptors = *ReadDatabaseDescriptors(*database, image.image_id);
@@ -114,6 +113,7 @@ struct Found {
 Found Measure(const std::function<std::function<void(PooledVector<BestTwo>*)>()>& build,
               int64_t num_queries) {
   Found found;
+  ReturnFreedMemory();
   const double before_mib = ResidentMib(), start = CpuSeconds();
   const auto search = build();
   found.build_s = CpuSeconds() - start;
@@ -237,6 +237,10 @@ int main(int argc, char** argv) {
     return 2;
   }
   const cairn::Descriptors all = cairn::ReadAll(paths);
+  if (all.queries.empty() || all.searched.empty()) {
+    std::fprintf(stderr, "search_curve: fewer than 51 images, or none with descriptors\n");
+    return 1;
+  }
   std::printf("%zu queries, %zu descriptors to search\n\n", all.queries.size(), all.searched.size());
   std::printf(
       "| searched | by | nearest found | a query (times faster than exact) | to build | memory "

@@ -24,8 +24,10 @@ constexpr int kNumTables = 12, kNumKeyBits = 20, kNumProbes = 2;
 constexpr int kNumOffered = 4;
 constexpr uint64_t kSeed = 1;
 // Descriptors that the exact search compares one with, in both directions, in the time that the other takes
-// for a query: 0.09 ms, at 430 G multiply-adds a second.
-constexpr int64_t kNumExactAsFast = 200000;
+// for a query among as many.
+constexpr int64_t kNumExactAsFast = 300000;
+// LshTable::getKey() reads so many bytes at once, of the last descriptor beyond its end.
+constexpr size_t kNumBytesBeyond = 8;
 
 // Trees and tables are drawn with OpenCV's generator of the thread, which has the same state afterwards.
 class SameRandomNumbers {
@@ -43,6 +45,10 @@ cvflann::Matrix<uint8_t> MatrixOf(const uint8_t* values, int64_t num_rows, int64
   return {const_cast<uint8_t*>(values), static_cast<size_t>(num_rows), static_cast<size_t>(num_values)};
 }
 
+std::string PaddedBits(const DescriptorMatrix& descriptors) {
+  return BitsOfDescriptors(descriptors).append(kNumBytesBeyond, '\0');
+}
+
 const uint8_t* BytesOf(const std::string& bits) { return reinterpret_cast<const uint8_t*>(bits.data()); }
 
 }  // namespace
@@ -55,7 +61,7 @@ class ApproximateIndex::Search {
     const SameRandomNumbers same;
     const int64_t num_rows = descriptors_.rows();
     if (space.measure == DescriptorMeasure::kHamming) {
-      bits_ = BitsOfDescriptors(descriptors_);
+      bits_ = PaddedBits(descriptors_);
       tables_ = std::make_unique<Tables>(MatrixOf(BytesOf(bits_), num_rows, space.num_values / 8),
                                          cvflann::LshIndexParams(kNumTables, kNumKeyBits, kNumProbes));
       tables_->buildIndex();
@@ -71,7 +77,7 @@ class ApproximateIndex::Search {
 
   void FindBestTwo(const DescriptorMatrix& queries, PooledVector<BestTwo>* best) const {
     best->assign(queries.rows(), {});
-    const std::string bits = tables_ ? BitsOfDescriptors(queries) : std::string();
+    const std::string bits = tables_ ? PaddedBits(queries) : std::string();
     const int64_t num_bytes = tables_ ? space_.num_values / 8 : space_.num_values;
     const uint8_t* values = tables_ ? BytesOf(bits) : queries.data();
     const cvflann::SearchParams params(kNumChecks);
@@ -80,6 +86,7 @@ class ApproximateIndex::Search {
     for (int64_t i = 0; i < queries.rows(); ++i) {
       uint8_t* query = const_cast<uint8_t*>(values + i * num_bytes);
       offered = tables_ ? Nearest(*tables_, query, params) : Nearest(*trees_, query, params);
+      if (offered.size() < 2) continue;
       DescriptorDots(queries.data() + i * space_.num_values, descriptors_, offered, space_, dots.data());
       for (size_t k = 0; k < offered.size(); ++k) Keep(offered[k], dots[k], &(*best)[i]);
     }
@@ -136,13 +143,14 @@ void ApproximateIndex::FindBestTwo(const DescriptorMatrix& queries, PooledVector
 }
 
 int64_t ApproximateIndex::NumBytes(int64_t num_descriptors, const DescriptorSpace& space) {
-  // A node of a k-d tree takes 40 bytes, there are two for each descriptor; a place in a table four, its
-  // buckets a vector each.
-  constexpr int64_t kTreeBytes = int64_t{2} * 40 * kNumTrees, kTableBytes = int64_t{16} * kNumTables;
-  constexpr int64_t kBucketBytes = (int64_t{1} << kNumKeyBits) * 24 * kNumTables;
-  const int64_t searched = space.measure == DescriptorMeasure::kHamming
-                               ? num_descriptors * (space.num_values / 8 + kTableBytes) + kBucketBytes
-                               : num_descriptors * kTreeBytes;
+  // A node of a k-d tree takes 32 bytes, there are two for each descriptor; what is in a table 90, with its
+  // bucket, and a bucket for every key where there are many.
+  constexpr int64_t kTreeBytes = int64_t{2} * 32 * kNumTrees, kTableBytes = int64_t{90} * kNumTables;
+  constexpr int64_t kNumKeys = int64_t{1} << kNumKeyBits, kBucketBytes = 24 * kNumKeys * kNumTables;
+  const int64_t hashed = num_descriptors * (space.num_values / 8 + kTableBytes) + kNumKeys / 8 * kNumTables +
+                         (num_descriptors > kNumKeys / 2 ? kBucketBytes : 0);
+  const int64_t searched =
+      space.measure == DescriptorMeasure::kHamming ? hashed : num_descriptors * kTreeBytes;
   return num_descriptors * space.num_values + searched;
 }
 

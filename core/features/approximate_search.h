@@ -17,13 +17,18 @@ namespace cairn {
 //   Lv07: Multi-probe LSH: efficient indexing for high-dimensional similarity search.
 class ApproximateIndex {
  public:
-  // REQUIRES: descriptors of the space's number of values; at least one
+  // Of fewer the exact search looks at all in less time; and FLANN's queues, which are as long as what was
+  // searched before on the thread, are long enough for any that is not smaller.
+  static constexpr int kMinNumDescriptors = 20000;
+
+  // REQUIRES: descriptors of the space's number of values; at least kMinNumDescriptors
   ApproximateIndex(DescriptorMatrix descriptors, const DescriptorSpace& space);
   ApproximateIndex(ApproximateIndex&&) noexcept;
   ApproximateIndex& operator=(ApproximateIndex&&) noexcept;
   ~ApproximateIndex();
 
-  // Of those that it offers the best two for each query, as the exact search has them of all.
+  // Of those that it offers the best two for each query, as the exact search has them of all; none where it
+  // offers fewer than two, as a best one without a second would pass for clear.
   void FindBestTwo(const DescriptorMatrix& queries, PooledVector<BestTwo>* best) const;
 
   const DescriptorMatrix& descriptors() const;

@@ -15,8 +15,9 @@ namespace {
 // Stream of the seed; the other streams grow the tree.
 constexpr uint64_t kSampleStream = 0;
 
-// Images whose descriptors are in memory at once.
+// What is in memory at once: images, and bytes of their descriptors, or one image.
 constexpr size_t kNumImagesAtOnce = 256;
+constexpr int64_t kNumBytesAtOnce = int64_t{64} << 20;
 
 // `count` of the numbers below `total`, or all, drawn without repetition, ascending: the first of all numbers
 // after each of them has changed places with one at random [Fisher-Yates], of which only those that are no
@@ -80,11 +81,13 @@ Status FillInvertedFiles(const DescriptorSource& images, double max_document_rat
                          Progress& progress, Vocabulary* vocabulary) {
   const size_t num_images = images.image_ids.size();
   progress.Begin("filling inverted files", static_cast<int64_t>(num_images), "images");
-  for (size_t begin = 0; begin < num_images; begin += kNumImagesAtOnce) {
+  for (size_t begin = 0, end = 0; begin < num_images; begin = end) {
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while filling inverted files");
     std::vector<DescriptorMatrix> descriptors;
-    for (size_t i = begin; i < std::min(begin + kNumImagesAtOnce, num_images); ++i) {
-      CAIRN_ASSIGN_OR_RETURN(descriptors.emplace_back(), ReadImage(images, i));
+    for (int64_t num_bytes = 0; end < num_images && end - begin < kNumImagesAtOnce; ++end) {
+      num_bytes += int64_t{images.num_descriptors[end]} * vocabulary->kind.num_values;
+      if (end > begin && num_bytes > kNumBytesAtOnce) break;
+      CAIRN_ASSIGN_OR_RETURN(descriptors.emplace_back(), ReadImage(images, end));
     }
     std::vector<std::vector<WordIdx>> words(descriptors.size());  // ascending
     ParallelFor(std::ssize(descriptors), num_threads, [&](int64_t i) {

@@ -53,7 +53,8 @@ struct DescriptorSource {
 // what the source reads; the same tree for any number of threads (all sums are of integers).  An image
 // without descriptors is a document without words.  If all descriptors are equal, the tree is one word; with
 // fewer distinct descriptors than branches, each is a word.  Cost: training descriptors * depth * rounds *
-// branching dot products.  Memory: the training descriptors, and eight bytes for each word of an image.
+// branching dot products.  Memory: the training descriptors, some 64 MiB of others,
+// and eight bytes for each word of an image.
 // Errors: InvalidArgument (an option; images not in ascending order), NoData (no descriptors), Cancelled; the
 // source's.
 Result<Vocabulary> BuildVocabulary(const DescriptorSource& images, const DescriptorKind& kind,

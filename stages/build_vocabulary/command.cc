@@ -20,16 +20,20 @@ namespace {
 
 // Bytes of memory per byte of the input file: of a large one, words are kept and no descriptors but those
 // that train the tree (bench/scale/README.md).
-constexpr double kMemoryPerFileByte = 1.5, kMemoryPerLargeFileByte = 0.15, kFixedMemory = 300.0 * (1 << 20);
+constexpr double kMemoryPerFileByte = 1.5, kMemoryPerLargeFileByte = 0.15, kFixedMemory = 250.0 * (1 << 20);
 
-Status CheckMemoryForFeatures(const std::string& path, int64_t memory_mib) {
+// And per descriptor that trains the tree.
+constexpr double kMemoryPerTrainingDescriptor = 2.0 * kSiftDescriptorDim;
+
+Status CheckMemoryForFeatures(const std::string& path, const BuildVocabularyOptions& options,
+                              int64_t memory_mib) {
   std::error_code error;
   const auto file = static_cast<double>(std::filesystem::file_size(path, error));
   if (error) return Ok();  // its reader says what is wrong
+  const double large = kMemoryPerLargeFileByte * file + kFixedMemory +
+                       kMemoryPerTrainingDescriptor * options.max_num_training_descriptors;
   return CheckMemory(fmt::format("learning the words of {}", path),
-                     static_cast<int64_t>(
-                         std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory)),
-                     memory_mib);
+                     static_cast<int64_t>(std::min(kMemoryPerFileByte * file, large)), memory_mib);
 }
 
 struct Arguments {
@@ -66,7 +70,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     for (const CaptureImage& image : capture.images) survey->insert(image.name);
   }
   const std::string& path = arguments.features_path;
-  CAIRN_RETURN_IF_ERROR(CheckMemoryForFeatures(path, environment.memory_mib));
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFeatures(path, arguments.options, environment.memory_mib));
   std::optional<Vocabulary> tree;
   if (!arguments.options.tree_from.empty()) {
     CAIRN_ASSIGN_OR_RETURN(tree, ReadVocabulary(arguments.options.tree_from));

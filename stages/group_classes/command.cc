@@ -164,11 +164,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const double num_adjusted = NumAdjustedAtOnce(capture, num_images, options, environment.num_threads);
   Status fits = CheckMemoryForMatches(arguments.matches, num_adjusted, environment.memory_mib);
   if (!fits.ok() && CheckMemoryForMatches(arguments.matches, 0, environment.memory_mib).ok()) {
-    return MakeError(
-        fits.error().code,
-        "{}; adjusting poses takes a part of it: a smaller --num-images-together takes less, and "
-        "with --refine-poses never it fits",
-        fits.error().message);
+    return MakeError(fits.error().code,
+                     "{}; adjusting poses takes a part of it, the less the smaller --num-images-together, "
+                     "--num-images-at-once and --threads are: with --refine-poses never it fits",
+                     fits.error().message);
   }
   CAIRN_RETURN_IF_ERROR(std::move(fits));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));

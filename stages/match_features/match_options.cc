@@ -88,10 +88,9 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
   OptionTable table = {
       {.name = "search",
        .value = &o->search,
-       .help =
-           "exact: each descriptor is compared with all of the other image; approximate: with those that "
-           "FLANN's trees or hashes offer, which misses some matches; auto: approximate where it is faster, "
-           "between images of some 400000 features",
+       .help = "exact: each descriptor is compared with all of the other image; approximate: with those that "
+               "FLANN's trees or hashes offer, which misses some matches, between images of 20000 features "
+               "and more; auto: approximate where it is faster, between images of some 600000",
        .choices = {"auto", "exact", "approximate"}},
       {.name = "max_ratio",
        .value = &o->matcher.max_ratio,

@@ -39,17 +39,22 @@ bool IsGuided(const MatchImage& image, const VerifyPairOptions& options) {
 
 // Whether a pair of so many features is searched by indices.
 bool IsSearchedByIndex(int64_t size1, int64_t size2, const DescriptorKind& kind, const std::string& search) {
+  if (std::min(size1, size2) < ApproximateIndex::kMinNumDescriptors) return false;
   return search == "approximate" || (search == "auto" && IsApproximateFaster(size1, size2, kind.space()));
 }
 
-// Per image.
+// Per image; an index where there is another one for which it is needed.
 std::vector<NeededFeatures> NeededOfImages(const MatchImages& images, const MatchPairsOptions& options) {
-  int most = 0;
-  for (const MatchImage& image : images.images) most = std::max(most, image.num_features);
+  int most = 0, second = 0;
+  for (const MatchImage& image : images.images) {
+    second = std::max(second, std::min(most, image.num_features));
+    most = std::max(most, image.num_features);
+  }
   std::vector<NeededFeatures> needed;
   for (const MatchImage& image : images.images) {
+    const int other = image.num_features == most ? second : most;
     needed.push_back({IsGuided(image, options.verification),
-                      IsSearchedByIndex(image.num_features, most, images.descriptor_kind, options.search)});
+                      IsSearchedByIndex(image.num_features, other, images.descriptor_kind, options.search)});
   }
   return needed;
 }

@@ -21,8 +21,8 @@ struct MatchPairsOptions {
   int memory_budget_mib = 512;
   DescriptorMatcherOptions matcher;  // has the defaults of max_ratio and max_angle_rad
   // "exact": each descriptor is compared with all of the other image.  "approximate": with those that FLANN
-  // offers (core/features/approximate_search.h), which misses some matches.  "auto": that where it is faster,
-  // between images of some 400,000 features.
+  // offers (core/features/approximate_search.h), which misses some matches; between images of 20,000 features
+  // and more.  "auto": that where it is faster, between images of some 600,000.
   std::string search = "auto";
   VerifyPairOptions verification;
 };

@@ -54,7 +54,7 @@ TEST_F(MatchFeaturesTest, SameBytesForAnyMemoryBudget) {
   EXPECT_EQ(*HashFile(folder_ + "/matches.db"), all_in_memory);
 }
 
-TEST_F(MatchFeaturesTest, OfFewFeaturesAnIndexOffersAll) {
+TEST_F(MatchFeaturesTest, OfFewFeaturesAllAreLookedAt) {
   WriteFeatures(6);
   ASSERT_TRUE(Match(true).ok());
   const std::string by_default = *HashFile(folder_ + "/matches.db");

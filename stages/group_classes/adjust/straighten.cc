@@ -1,5 +1,6 @@
 #include "stages/group_classes/adjust/straighten.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <numeric>
 #include <utility>
