@@ -14,7 +14,7 @@
 
 namespace cairn::match_features {
 
-// A features.db of `num_images` cameras side by side that see the same 80 points, each with its
+// A features.db of `num_images` cameras side by side that see the same points, each with its
 // own descriptor.
 class MatchFeaturesTest : public testing::Test {
  protected:
@@ -32,8 +32,8 @@ class MatchFeaturesTest : public testing::Test {
     camera.params = {500, 500, 320, 240};
     Random random(3);
     std::vector<Eigen::Vector3d> points;
-    DescriptorMatrix descriptors(80, kSiftDescriptorDim);
-    for (int i = 0; i < 80; ++i) {
+    DescriptorMatrix descriptors(num_points_, kSiftDescriptorDim);
+    for (int i = 0; i < num_points_; ++i) {
       points.emplace_back(random.Uniform(-0.8, 0.8), random.Uniform(-0.6, 0.6), random.Uniform(2, 4));
       Eigen::Matrix<double, 1, kSiftDescriptorDim> d;
       for (int k = 0; k < kSiftDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 4);
@@ -75,6 +75,7 @@ class MatchFeaturesTest : public testing::Test {
     return MatchFeatures(inputs_, options_, folder_ + "/" + name, seed_, num_threads, progress, reuse);
   }
 
+  int num_points_ = 80;
   std::string folder_;
   Capture capture_;
   MatchFeaturesInputs inputs_;

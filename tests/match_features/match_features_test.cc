@@ -68,6 +68,30 @@ TEST_F(MatchFeaturesTest, OfFewFeaturesAllAreLookedAt) {
   }
 }
 
+TEST_F(MatchFeaturesTest, ManyFeaturesAreSearchedByAnIndex) {
+  num_points_ = ApproximateIndex::kMinNumDescriptors;
+  WriteFeatures(3, [](SQLite::Database& database) {
+    // One image has too few: all of it are looked at.
+    for (const char* table : {"keypoints", "descriptors"}) {
+      database.exec(
+          fmt::format("UPDATE {0} SET rows = 500, data = substr(data, 1, 500 * length(data) / rows) "
+                      "WHERE image_id = 3",
+                      table));
+    }
+  });
+  options_.matching.search = "approximate";
+  options_.matching.verification.guided_matching = "none";
+  const auto summary = Match(true);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_pairs_verified, 3);
+  auto database = OpenDatabaseReadOnly(folder_ + "/matches.db");
+  const auto geometries = ReadDatabaseTwoViewGeometries(*database, 15);
+  ASSERT_EQ(geometries->size(), 3u);
+  EXPECT_GT(geometries->front().inliers.size(), 0.95 * num_points_);
+  for (const struct Match& match : geometries->front().inliers) EXPECT_EQ(match.idx1, match.idx2);
+  EXPECT_GT(geometries->back().inliers.size(), 450u);
+}
+
 TEST_F(MatchFeaturesTest, FrustumGoesOnFromSeedsToThePairsTheyPredict) {
   // Each image with its two nearest first.  All see the same points, so that these pairs carry tracks from
   // the first image to the last.
