@@ -70,14 +70,6 @@ Matches Select(std::span<const BestTwo> rows, std::span<const BestTwo> columns) 
   return matches;
 }
 
-void Keep(int idx, int dot, BestTwo* kept) {
-  if (dot > kept->best) {
-    *kept = {idx, dot, kept->best};
-  } else {
-    kept->second = std::max(kept->second, dot);
-  }
-}
-
 // Products of floats are exact here: sums stay below 2^24.
 Matches ExactMatches(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2) {
   const Floats floats1 = descriptors1.cast<float>(), floats2 = descriptors2.cast<float>();
@@ -87,8 +79,8 @@ Matches ExactMatches(const DescriptorMatrix& descriptors1, const DescriptorMatri
     const Floats dots = floats1.middleRows(begin, num) * floats2.transpose();
     for (int i = 0; i < num; ++i) {
       for (int j = 0; j < dots.cols(); ++j) {
-        Keep(j, static_cast<int>(dots(i, j)), &rows[begin + i]);
-        Keep(begin + i, static_cast<int>(dots(i, j)), &columns[j]);
+        rows[begin + i].Offer(j, static_cast<int>(dots(i, j)));
+        columns[j].Offer(begin + i, static_cast<int>(dots(i, j)));
       }
     }
   }
@@ -113,7 +105,7 @@ PooledVector<BestTwo> BestOf(const DescriptorMatrix& queries, const DescriptorMa
   for (int i = 0; i < queries.rows(); ++i) {
     for (int k = 0; k < 2; ++k) {
       const int j = candidate(i, k);
-      Keep(j, queries.row(i).cast<int>().dot(searched.row(j).cast<int>()), &best[i]);
+      best[i].Offer(j, queries.row(i).cast<int>().dot(searched.row(j).cast<int>()));
     }
   }
   return best;

@@ -168,14 +168,7 @@ Found Words(const DescriptorMatrix& queries, const DescriptorMatrix& searched) {
             const auto& candidates = of_word[QuantizeDescriptor(vocabulary, queries.row(q).data())];
             dots.resize(candidates.size());
             DescriptorDots(queries.row(q).data(), searched, candidates, {}, dots.data());
-            for (size_t i = 0; i < candidates.size(); ++i) {
-              BestTwo& kept = (*best)[q];
-              if (dots[i] > kept.best) {
-                kept = {candidates[i], dots[i], kept.best};
-              } else {
-                kept.second = std::max(kept.second, dots[i]);
-              }
-            }
+            for (size_t i = 0; i < candidates.size(); ++i) (*best)[q].Offer(candidates[i], dots[i]);
           }
         };
       },

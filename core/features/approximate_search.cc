@@ -88,7 +88,10 @@ class ApproximateIndex::Search {
       offered = tables_ ? Nearest(*tables_, query, params) : Nearest(*trees_, query, params);
       if (offered.size() < 2) continue;
       DescriptorDots(queries.data() + i * space_.num_values, descriptors_, offered, space_, dots.data());
-      for (size_t k = 0; k < offered.size(); ++k) Keep(offered[k], dots[k], &(*best)[i]);
+      // In the order of their indices: of equal ones the first is the best.
+      for (size_t k = 0; k < offered.size(); ++k) {
+        if (space_.is_sift() || dots[k] > 0) (*best)[i].Offer(offered[k], dots[k]);
+      }
     }
   }
 
@@ -97,29 +100,18 @@ class ApproximateIndex::Search {
   using Tables = cvflann::LshIndex<cvflann::Hamming<uint8_t>>;
 
   template <typename Index>
-  std::vector<int32_t> Nearest(Index& index, uint8_t* query, const cvflann::SearchParams& params) const {
+  static std::vector<int32_t> Nearest(Index& index, uint8_t* query, const cvflann::SearchParams& params) {
     using Distance = typename Index::DistanceType;
-    const auto capacity = static_cast<int>(std::min<int64_t>(kNumOffered, descriptors_.rows()));
     // Tables offer a descriptor more than once.
-    cvflann::KNNUniqueResultSet<Distance> nearest(capacity);
+    cvflann::KNNUniqueResultSet<Distance> nearest(kNumOffered);
     index.findNeighbors(nearest, query, params);
     std::array<int, kNumOffered> found = {};
     std::array<Distance, kNumOffered> distances = {};
     found.fill(-1);
-    nearest.copy(found.data(), distances.data(), capacity);
+    nearest.copy(found.data(), distances.data(), kNumOffered);
     std::vector<int32_t> idxs(found.begin(), std::find(found.begin(), found.end(), -1));
     std::sort(idxs.begin(), idxs.end());
     return idxs;
-  }
-
-  // Offered in the order of their indices: of equal ones the first is the best.
-  void Keep(int32_t idx, int32_t dot, BestTwo* kept) const {
-    if (!space_.is_sift() && dot <= 0) return;
-    if (dot > kept->best) {
-      *kept = {idx, dot, kept->best};
-    } else {
-      kept->second = std::max(kept->second, dot);
-    }
   }
 
   const DescriptorMatrix descriptors_;

@@ -37,6 +37,17 @@ struct BestTwo {
   int32_t idx = -1;  // of the best, the smallest if several are
   int32_t best = -1;
   int32_t second = -1;
+
+  // Of equal ones the first that is offered stays the best.
+  void Offer(int32_t offered, int32_t dot) {
+    if (dot > best) {
+      second = best;
+      best = dot;
+      idx = offered;
+    } else if (dot > second) {
+      second = dot;
+    }
+  }
 };
 // Of the best two of 2 for every descriptor of 1 (rows) and of 1 for every one of 2 (columns), those that
 // pass.
