@@ -192,20 +192,35 @@ TEST(GroupClasses, ConstantOffsetAndFocalLengthAreFound) {
   EXPECT_EQ(result.classes.stated_cameras[0].FocalX(), 500);
 }
 
-// Means of the errors of a survey's poses, without an offset and the world's frame.
-double MeanErrorDeg(const Survey& survey, const Classes& classes, bool stated) {
+// The mean of error(a, b, true a, true b) over all pairs of a survey's poses, as stated or as refined.
+template <typename Error>
+double MeanOverPairs(const Survey& survey, const Classes& classes, bool stated, const Error& error) {
+  const auto pose = [&](size_t k) {
+    return stated ? classes.images[k].given_cam_from_world : classes.images[k].cam_from_world;
+  };
   double sum = 0;
   int count = 0;
   for (size_t i = 0; i < survey.true_poses.size(); ++i) {
-    for (size_t j = 0; j < i; ++j, ++count) {
-      const auto pose = [&](size_t k) {
-        return stated ? classes.images[k].given_cam_from_world : classes.images[k].cam_from_world;
-      };
-      sum += RotationErrorDeg(pose(i) * pose(j).Inverse(),
-                              survey.true_poses[i] * survey.true_poses[j].Inverse());
-    }
+    for (size_t j = 0; j < i; ++j, ++count)
+      sum += error(pose(i), pose(j), survey.true_poses[i], survey.true_poses[j]);
   }
   return sum / count;
+}
+
+// Means of the errors of a survey's poses, without an offset and the world's frame.
+double MeanErrorDeg(const Survey& survey, const Classes& classes, bool stated) {
+  return MeanOverPairs(survey, classes, stated,
+                       [](const Pose& a, const Pose& b, const Pose& true_a, const Pose& true_b) {
+                         return RotationErrorDeg(a * b.Inverse(), true_a * true_b.Inverse());
+                       });
+}
+
+// Of distances between cameras, root mean square.
+double DistanceErrorM(const Survey& survey, const Classes& classes, bool stated) {
+  return std::sqrt(MeanOverPairs(survey, classes, stated,
+                                 [](const Pose& a, const Pose& b, const Pose& true_a, const Pose& true_b) {
+                                   return std::pow(CenterErrorM(a, b) - CenterErrorM(true_a, true_b), 2);
+                                 }));
 }
 
 TEST(GroupClasses, DriftIsFoundAndStraightened) {
@@ -247,22 +262,6 @@ TEST(GroupClasses, PointsFollowTheStepsOfAWholeThatWasInParts) {
   options.adjustment.max_num_iterations = 2;
   const Classes classes = Group(survey, options).classes;
   EXPECT_LT(MeanErrorDeg(survey, classes, false), 0.1 * MeanErrorDeg(survey, classes, true));
-}
-
-// Of distances between cameras, root mean square.
-double DistanceErrorM(const Survey& survey, const Classes& classes, bool stated) {
-  double sum = 0;
-  int count = 0;
-  for (size_t i = 0; i < survey.true_poses.size(); ++i) {
-    for (size_t j = 0; j < i; ++j, ++count) {
-      const auto pose = [&](size_t k) {
-        return stated ? classes.images[k].given_cam_from_world : classes.images[k].cam_from_world;
-      };
-      sum += std::pow(
-          CenterErrorM(pose(i), pose(j)) - CenterErrorM(survey.true_poses[i], survey.true_poses[j]), 2);
-    }
-  }
-  return std::sqrt(sum / count);
 }
 
 // Two blocks of twelve images turn as right as all 24 together.  What their size is beside each other they
