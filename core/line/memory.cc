@@ -73,13 +73,18 @@ Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mi
       work, needed_mib, memory_mib);
 }
 
+Status CheckMemoryForFile(const std::string& work, const std::string& path,
+                          const std::function<double(double)>& num_bytes, int64_t memory_mib) {
+  std::error_code error;
+  const auto file = static_cast<double>(std::filesystem::file_size(path, error));
+  if (error) return Ok();  // the reader of the file says why it cannot be read
+  return CheckMemory(fmt::format("{} of {}", work, path), std::llround(num_bytes(file)), memory_mib);
+}
+
 Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,
                           int64_t memory_mib) {
-  std::error_code error;
-  const auto num_bytes = static_cast<double>(std::filesystem::file_size(path, error));
-  if (error) return Ok();  // the reader of the file says why it cannot be read
-  return CheckMemory(fmt::format("{} of {}", work, path), std::llround(bytes_per_file_byte * num_bytes),
-                     memory_mib);
+  return CheckMemoryForFile(
+      work, path, [&](double file) { return bytes_per_file_byte * file; }, memory_mib);
 }
 
 }  // namespace cairn

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "core/base/error.h"
@@ -26,6 +27,9 @@ void ReturnFreedMemory();
 // bench/crash/README.md).
 Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,
                           int64_t memory_mib);
+// `num_bytes`: the estimate by the file's bytes.
+Status CheckMemoryForFile(const std::string& work, const std::string& path,
+                          const std::function<double(double)>& num_bytes, int64_t memory_mib);
 Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mib);
 
 }  // namespace cairn

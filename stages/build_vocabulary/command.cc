@@ -1,12 +1,10 @@
 #include "stages/build_vocabulary/command.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "core/capture/capture.h"
@@ -27,13 +25,14 @@ constexpr double kMemoryPerTrainingDescriptor = 2.0 * kSiftDescriptorDim;
 
 Status CheckMemoryForFeatures(const std::string& path, const BuildVocabularyOptions& options,
                               int64_t memory_mib) {
-  std::error_code error;
-  const auto file = static_cast<double>(std::filesystem::file_size(path, error));
-  if (error) return Ok();  // its reader says what is wrong
-  const double large = kMemoryPerLargeFileByte * file + kFixedMemory +
-                       kMemoryPerTrainingDescriptor * options.max_num_training_descriptors;
-  return CheckMemory(fmt::format("learning the words of {}", path),
-                     static_cast<int64_t>(std::min(kMemoryPerFileByte * file, large)), memory_mib);
+  return CheckMemoryForFile(
+      "learning the words", path,
+      [&](double file) {
+        return std::min(kMemoryPerFileByte * file,
+                        kMemoryPerLargeFileByte * file + kFixedMemory +
+                            kMemoryPerTrainingDescriptor * options.max_num_training_descriptors);
+      },
+      memory_mib);
 }
 
 struct Arguments {

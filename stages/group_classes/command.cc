@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -42,15 +40,13 @@ double NumAdjustedAtOnce(const Capture& capture, int64_t num_images, const Group
 
 // Refuses what grouping has no room for.
 Status CheckMemoryForMatches(const std::string& matches, double num_adjusted, int64_t memory_mib) {
-  std::error_code error;
-  const auto file = static_cast<double>(std::filesystem::file_size(matches, error));
-  if (error) return Ok();  // its reader says what is wrong
-  const double unadjusted =
-      std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory);
-  const double adjusting =
-      std::min(kMemoryPerImageAdjusted * num_adjusted, kMemoryPerFileByteAdjusted * file);
-  return CheckMemory(fmt::format("grouping the matches of {}", matches),
-                     static_cast<int64_t>(unadjusted + adjusting), memory_mib);
+  return CheckMemoryForFile(
+      "grouping the matches", matches,
+      [&](double file) {
+        return std::min(kMemoryPerFileByte * file, kMemoryPerLargeFileByte * file + kFixedMemory) +
+               std::min(kMemoryPerImageAdjusted * num_adjusted, kMemoryPerFileByteAdjusted * file);
+      },
+      memory_mib);
 }
 
 Result<int64_t> CountImages(const std::string& matches) {
