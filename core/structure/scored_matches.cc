@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <queue>
-#include <tuple>
 #include <utility>
 
 namespace cairn {
@@ -12,11 +11,6 @@ namespace {
 constexpr size_t kNumReadAtOnce = 1 << 16;  // of a run
 
 }  // namespace
-
-bool operator<(const ScoredMatches::Match& a, const ScoredMatches::Match& b) {
-  return std::tie(b.dot_product, a.keypoint1, a.keypoint2) <
-         std::tie(a.dot_product, b.keypoint1, b.keypoint2);
-}
 
 // The next match of a run of the file.
 class ScoredMatches::RunReader {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -28,7 +29,10 @@ class ScoredMatches {
     int32_t keypoint1 = 0, keypoint2 = 0;  // counted over all images
     int32_t dot_product = 0;
     // Most alike first.
-    friend bool operator<(const Match& a, const Match& b);
+    friend bool operator<(const Match& a, const Match& b) {
+      if (a.dot_product != b.dot_product) return a.dot_product > b.dot_product;
+      return std::pair(a.keypoint1, a.keypoint2) < std::pair(b.keypoint1, b.keypoint2);
+    }
   };
 
   // num_keypoints[i]: number of keypoints of image i.

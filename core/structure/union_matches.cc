@@ -1,6 +1,7 @@
 #include "core/structure/union_matches.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <utility>
 
@@ -23,6 +24,13 @@ class TrackSets {
     for (size_t image = 0; image + 1 < first_keypoint.size(); ++image)
       image_of_.insert(image_of_.end(), first_keypoint[image + 1] - first_keypoint[image],
                        static_cast<int32_t>(image));
+  }
+
+  // To be called some time before Union(): most of its time is spent on waiting for memory.
+  void Prefetch(int32_t keypoint) const {
+    sets_.Prefetch(keypoint);
+    __builtin_prefetch(&next_[keypoint]);
+    __builtin_prefetch(&image_of_[keypoint]);
   }
 
   // False when the two sets hold different keypoints of one image.
@@ -78,10 +86,22 @@ Result<std::vector<Track>> UnionMatches(ScoredMatches matches, int64_t* num_conf
   const std::vector<int32_t> first_keypoint = matches.first_keypoint();
   TrackSets sets(first_keypoint);
   *num_conflicts = 0;
-  CAIRN_RETURN_IF_ERROR(std::move(matches).Visit([&](const ScoredMatches::Match& match) {
+  constexpr size_t kNumAhead = 32;
+  std::array<ScoredMatches::Match, kNumAhead> ahead;
+  size_t num_visited = 0;
+  const auto unite = [&](const ScoredMatches::Match& match) {
     // [Sala06 §VI-B] keypoints are equivalent where verified matches join them, not by their distance alone
     if (!sets.Union(match.keypoint1, match.keypoint2)) ++*num_conflicts;
+  };
+  CAIRN_RETURN_IF_ERROR(std::move(matches).Visit([&](const ScoredMatches::Match& match) {
+    ScoredMatches::Match& next = ahead[num_visited % kNumAhead];
+    if (num_visited++ >= kNumAhead) unite(next);
+    next = match;
+    sets.Prefetch(match.keypoint1);
+    sets.Prefetch(match.keypoint2);
   }));
+  for (size_t i = num_visited - std::min(num_visited, kNumAhead); i < num_visited; ++i)
+    unite(ahead[i % kNumAhead]);
   return sets.Tracks();
 }
 
