@@ -4,7 +4,7 @@
 
 namespace cairn {
 
-void ReuseArguments::Add(ArgumentParser& parser, const std::string& results) {
+Argument ReuseArguments::Add(ArgumentParser& parser, const std::string& results) {
   const Argument reuse =
       parser
           .Add("--reuse", files_,
@@ -13,7 +13,7 @@ void ReuseArguments::Add(ArgumentParser& parser, const std::string& results) {
           .Type("FILE")
           .OneAtATime();
   parser.AddFlag("--no-reuse", no_reuse_, "Compute everything again").Excludes(reuse);
-  parser
+  return parser
       .Add("--shard", shard_,
            "Compute only the I-th of N shares of the " + results +
                " that no --reuse file has, and write only these; a run without --shard merges")

@@ -12,8 +12,8 @@ namespace cairn {
 // `--reuse FILE`, `--no-reuse` and `--shard I/N` of a stage that takes over what did not change.
 class ReuseArguments {
  public:
-  // `results`: what the stage takes over, for --help ("images", "pairs").
-  void Add(ArgumentParser& parser, const std::string& results);
+  // `results`: what the stage takes over, for --help ("images", "pairs").  Returns --shard.
+  Argument Add(ArgumentParser& parser, const std::string& results);
   // Errors: InvalidArgument (an invalid shard, or one that would replace a file that it reads).
   Result<ReuseOptions> Apply(const std::string& output_path) const;
 

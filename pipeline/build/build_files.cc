@@ -28,7 +28,8 @@ bool IsBuildFileName(const std::string& name) {
     std::string stems = "images|(film|bag|map)-[-A-Za-z0-9_.]+";
     for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
     return std::regex("(" + stems +
-                      ")([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.solved|"
+                      ")([-.][0-9]+(of[0-9]+|-plan)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\."
+                      "solved|\\.shards|"
                       "\\.report\\.json)*");
   }();
   static const std::set<std::string> kOthers = {"config.mk", "recipe", "check.json", "error.json", "lock"};

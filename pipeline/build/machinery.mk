@@ -144,29 +144,42 @@ CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if
 
 # ---- Shards
 
-# Each shard takes over results from the output's last version and from the shards of earlier rounds, computes its share
-# of the rest and writes X-ROUND-IofN.db.  A finished shard stays when others are killed.  Then the stage itself takes over
-# all shards, computes what is missing and removes them, with those of an earlier SHARDS.  They are SECONDARY: a missing
-# shard makes nothing out of date.
+# A plan says how many shards of a round have work, in X-ROUND-plan.db.shards: of a small survey fewer than SHARDS, or none
+# ("0 last").
+# Each of these computes its share of what earlier versions and earlier rounds lack and writes X-ROUND-IofN.db; the others
+# are not launched.  A finished shard stays when others are killed.  Then the stage itself takes over all shards, computes
+# what is missing and removes them, with those of an earlier SHARDS.  They are SECONDARY: a missing shard makes nothing out
+# of date.
 CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
-# $(call CAIRN_SHARD_STAMPS,X,ROUNDS)
-CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp))
+# $(call CAIRN_SHARD_STAMPS,X,ROUNDS): those of plans, too.
+CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp) \
+    $(BUILD)/$(1)-$(round)-plan.stamp)
+# What a round begins with.  $(call CAIRN_AFTER_ROUND,X,ROUND): no round is the inputs.
+CAIRN_AFTER_ROUND = $(if $(2),$(call CAIRN_SHARD_STAMPS,$(1),$(2)),$(BUILD)/$(1).begun)
 # $(call CAIRN_SHARD_RULE,X,ROUND,I,COMMAND,EARLIER ROUNDS): COMMAND is the name of a variable
 define CAIRN_SHARD_RULE
 .SECONDARY: $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp
 $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(5))
 $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: PROGRESS := $(if $(filter json,$(PROGRESS)),json,none)
-$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(lastword $(5))),$(BUILD)/$(1).begun)
-	$$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$(SHARDS) $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
-	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(BUILD)/$(1)-$(2)-plan.stamp
+	read -r n last < $$(@D)/$(1)-$(2)-plan.db.shards; if [ $(3) -gt $$$$n ]; then touch $$@; else \
+	    $$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$$$$n $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
+	    $$(CAIRN_REUSE_SHARDS) $$(if $$(filter matches,$(1)),--planned $$(@D)/$(1)-$(2)-plan.db) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS); fi
+endef
+# $(call CAIRN_PLAN_RULE,X,ROUND,EARLIER ROUNDS)
+define CAIRN_PLAN_RULE
+.SECONDARY: $(BUILD)/$(1)-$(2)-plan.stamp
+$(BUILD)/$(1)-$(2)-plan.stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(3))
+$(BUILD)/$(1)-$(2)-plan.stamp: BEFORE := $(BUILD)/$(1)-$(lastword 0 $(3))-plan.db.shards
+$(BUILD)/$(1)-$(2)-plan.stamp: $(call CAIRN_AFTER_ROUND,$(1),$(lastword $(3)))
 endef
 # Prerequisites of the first round: they remove shards of earlier inputs.
 .SECONDARY: $(BUILD)/features.begun $(BUILD)/matches.begun
 $(BUILD)/features.begun $(BUILD)/matches.begun:
-	rm -f $(@:.begun=)-*of*
+	rm -f $(@:.begun=)-*of* $(@:.begun=)-*-plan*
 	touch $@
-CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
-CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
+CAIRN_REUSE_SHARDS = $$(for shard in $(SHARD_STAMPS:.stamp=.db); do [ ! -e $$shard ] || echo --reuse $$shard; done)
+CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of* $(@:.db.stamp=)-*-plan*
 
 # ---- The capture that map.mk makes: simulated, imported, or joined
 

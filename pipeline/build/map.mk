@@ -24,8 +24,10 @@ CAIRN_RULES := $(dir $(lastword $(MAKEFILE_LIST)))
 CAIRN ?= $(shell command -v cairn)
 # Put before every command, for example a cluster's `srun` (docs/cluster.md).
 LAUNCH ?=
-# The number of parts of stages 1 and 2, each with its own run of the program: side by side with -j.
+# The most parts of stages 1 and 2, each with its own run of the program: side by side with -j.
 SHARDS ?= 1
+# The fewest images of a part.
+SHARD_IMAGES ?= 64
 # The number of rounds in which pairs that matches predict are matched in parts; stage 2 itself matches later ones.
 SHARD_ROUNDS ?= 4
 THREADS ?= 0
@@ -66,7 +68,12 @@ endif
 CAIRN_EXTRACT = stage extract-features $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) --options $(@D)/options/extract_features.toml $(addprefix --model ,$(MODEL))
 FEATURES_INPUTS := $(call CAIRN_OPTIONS,extract_features) $(BUILD)/options/capture $(CAPTURE_STAMP) $(CAPTURE_LISTS) \
     $(CAPTURE_IMAGES) $(GIVEN_FEATURES) $(MODEL)
-FEATURES_SHARDS := $(call CAIRN_SHARD_STAMPS,features,1)
+FEATURES_SHARDS := $(if $(CAIRN_SHARD_NUMBERS),$(call CAIRN_SHARD_STAMPS,features,1))
+$(if $(FEATURES_SHARDS),$(eval $(call CAIRN_PLAN_RULE,features,1,)))
+$(BUILD)/features-1-plan.stamp:
+	n=$$(($$(find -L $(CAPTURE)/ -type f | wc -l) / $(SHARD_IMAGES))); [ $$n -le $(SHARDS) ] || n=$(SHARDS); \
+	    [ $$n -ge 2 ] || n=0; echo $$n > $(@:.stamp=.db.shards)
+	touch $@
 $(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call CAIRN_SHARD_RULE,features,1,$(shard),CAIRN_EXTRACT,)))
 $(BUILD)/features.begun: $(FEATURES_INPUTS)
 $(BUILD)/features.db.stamp: SHARD_STAMPS := $(FEATURES_SHARDS)
@@ -90,6 +97,12 @@ MATCHES_ROUNDS := $(if $(CAIRN_SHARD_NUMBERS),$(shell seq $(SHARD_ROUNDS)))
 MATCHES_SHARDS := $(call CAIRN_SHARD_STAMPS,matches,$(MATCHES_ROUNDS))
 $(foreach round,$(MATCHES_ROUNDS),$(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call \
     CAIRN_SHARD_RULE,matches,$(round),$(shard),CAIRN_MATCH,$(wordlist 2,$(round),0 $(MATCHES_ROUNDS))))))
+$(foreach round,$(MATCHES_ROUNDS),$(eval $(call CAIRN_PLAN_RULE,matches,$(round),$(wordlist 2,$(round),0 $(MATCHES_ROUNDS)))))
+# Where too little is left to be divided, the stage itself does the rest.
+$(MATCHES_ROUNDS:%=$(BUILD)/matches-%-plan.stamp):
+	if [ -e $(BEFORE) ] && grep -q last $(BEFORE); then echo 0 last > $(@:.stamp=.db.shards); touch $@; else \
+	    $(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) --plan $(SHARDS) --shard-images $(SHARD_IMAGES) \
+	    $(addprefix --reuse ,$(wildcard $(@D)/matches.db)) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=.db) $(CAIRN_FLAGS); fi
 $(BUILD)/matches.begun: $(MATCHES_INPUTS)
 $(BUILD)/matches.db.stamp: SHARD_STAMPS := $(MATCHES_SHARDS)
 $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)

@@ -15,6 +15,7 @@ struct CompileArguments {
   std::string build_dir;
   std::string until;
   int num_shards = 1;
+  int min_num_shard_images = 64;
   int num_jobs = 0;  // 0: as many as shards
   std::string launcher;
   bool no_space_check = false;

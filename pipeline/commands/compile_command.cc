@@ -242,6 +242,8 @@ Status Compile(CompileArguments arguments, const CommandEnvironment& environment
   CAIRN_RETURN_IF_ERROR(
       variables.Set("SPACE_CHECK", "--no-space-check", {arguments.no_space_check ? "no" : ""}));
   CAIRN_RETURN_IF_ERROR(variables.Set("SHARDS", "--shards", {std::to_string(arguments.num_shards)}));
+  CAIRN_RETURN_IF_ERROR(
+      variables.Set("SHARD_IMAGES", "--shard-images", {std::to_string(arguments.min_num_shard_images)}));
   CAIRN_ASSIGN_OR_RETURN(std::vector<std::string> words,
                          MakeWords(rules, paths.build_dir, paths.program, goal, environment,
                                    collides ? "lines" : environment.progress_style, std::move(variables)));
@@ -277,9 +279,15 @@ void AddRunArguments(ArgumentParser& parser, CompileArguments* arguments) {
   parser.Add("--until", arguments->until, "Stop after this stage").Type("STAGE");
   parser
       .Add("--shards", arguments->num_shards,
-           "Parts in which features and matches are made, each by a process of its own [1]")
+           "Most parts in which features and matches are made, each by a process of its own [1]")
       .Range(1, 100000)
       .Type("N");
+  parser
+      .Add("--shard-images", arguments->min_num_shard_images,
+           "Fewest images of a part: of a small survey there are fewer parts, as what each costs to start "
+           "would be more than it saves [64]")
+      .Range(1, 1000000)
+      .Type("M");
   parser
       .Add("--launch", arguments->launcher,
            "Words put before every stage's command, for a cluster: 'srun -n1 -c2' (docs/cluster.md)")

@@ -27,7 +27,18 @@ struct Arguments {
   MatchFeaturesOptions options;
   OptionArguments option_arguments;
   ReuseArguments reuse;
+  PlanOptions plan;
 };
+
+void PrintPlan(const MatchFeaturesSummary& summary, const PlanOptions& plan, std::ostream& out) {
+  const int num_shards = summary.num_shards_with_work;
+  const std::string what = summary.image_step.empty()
+                               ? fmt::format("round {} of pairs ({})", summary.num_rounds, summary.pairs)
+                               : summary.image_step + " of images";
+  out << fmt::format("match_features: plan for {} shards: {}: ", plan.num_shards, what)
+      << (num_shards == 0 ? "too little left to be divided\n"
+                          : fmt::format("{} left to {} of them\n", summary.num_left_to_others, num_shards));
+}
 
 void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::ostream& out) {
   if (!reuse.shard) {
@@ -48,10 +59,11 @@ void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::
     out << fmt::format("match_features: {}: nothing to do, all pairs ({}) are known\n", shard, summary.pairs);
     return;
   }
+  const std::string round = summary.num_rounds > 0 ? fmt::format("round {} of ", summary.num_rounds) : "";
   out << fmt::format(
-      "match_features: {}: round {} of pairs ({}): {} tried, {} verified, {} taken over; {} left to other "
+      "match_features: {}: {}pairs ({}): {} tried, {} verified, {} taken over; {} left to other "
       "shards\n",
-      shard, summary.num_rounds, summary.pairs, summary.num_pairs_tried, summary.num_pairs_verified,
+      shard, round, summary.pairs, summary.num_pairs_tried, summary.num_pairs_verified,
       summary.num_taken_over, summary.num_left_to_others);
 }
 
@@ -83,6 +95,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
   CAIRN_RETURN_IF_ERROR(CheckWhatChoosesPairs(arguments));
+  if (!arguments.inputs.plan_path.empty() && !reuse.shard) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--planned {}: a plan is for shards; say which one this is with --shard I/N",
+                     arguments.inputs.plan_path);
+  }
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
@@ -96,14 +113,18 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (capture) inputs.capture = &*capture;
   std::error_code error;  // the stage reports a missing file
   const auto features_bytes = static_cast<double>(fs::file_size(inputs.features_path, error));
-  if (!arguments.no_space_check && !error) {
+  const bool is_plan = arguments.plan.num_shards > 0;
+  if (!arguments.no_space_check && !error && !is_plan) {
     CAIRN_RETURN_IF_ERROR(CheckDiskSpace("a copy of the features with matches",
                                          fs::absolute(arguments.output).parent_path(),
                                          static_cast<int64_t>(kMatchesPerFeaturesBytes * features_bytes)));
   }
   CAIRN_ASSIGN_OR_RETURN(const MatchFeaturesSummary summary,
-                         MatchFeatures(inputs, options, arguments.output, environment.seed,
-                                       environment.num_threads, *environment.progress, reuse));
+                         is_plan
+                             ? PlanShards(inputs, options, arguments.plan, arguments.output, environment.seed,
+                                          environment.num_threads, *environment.progress, reuse)
+                             : MatchFeatures(inputs, options, arguments.output, environment.seed,
+                                             environment.num_threads, *environment.progress, reuse));
   for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
   if (summary.num_without_features > 0) {
     spdlog::warn("{}: {} of {} images without features are skipped", inputs.features_path,
@@ -115,7 +136,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   environment.report->taken_over = {{"pairs", summary.num_taken_over}};
   AddDropped("images", {{"no features", summary.num_without_features}}, environment.report);
   AddDropped("pairs", summary.dropped_pairs, environment.report);
-  Print(summary, reuse, *environment.out);
+  if (is_plan) {
+    PrintPlan(summary, arguments.plan, *environment.out);
+  } else {
+    Print(summary, reuse, *environment.out);
+  }
   return Ok();
 }
 
@@ -145,7 +170,24 @@ Command MatchFeaturesCommand() {
                 parser.Add("-o,--output", arguments->output, "COLMAP database to write")
                     .Required()
                     .Type("matches.db");
-                arguments->reuse.Add(parser, "pairs");
+                const Argument shard = arguments->reuse.Add(parser, "pairs");
+                parser
+                    .Add("--plan", arguments->plan.num_shards,
+                         "Write which pairs each of N shards matches next, given what --reuse files have, "
+                         "instead of matching (docs/cluster.md)")
+                    .Range(1, 100000)
+                    .Type("N")
+                    .Excludes(shard);
+                parser
+                    .Add("--shard-images", arguments->plan.min_num_images,
+                         "--plan: fewest images of a shard, or pairs that take as long; of less, fewer "
+                         "shards have work [64]")
+                    .Range(1, 1000000)
+                    .Type("N");
+                parser
+                    .Add("--planned", arguments->inputs.plan_path,
+                         "--shard: the plan that says which pairs are the shard's")
+                    .Type("PLAN.db");
                 parser.AddFlag("--no-space-check", arguments->no_space_check,
                                "Begin even if the disk seems too full for the result");
                 arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));

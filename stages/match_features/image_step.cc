@@ -4,10 +4,15 @@
 #include <string_view>
 #include <utility>
 
+#include "stages/match_features/shard_plan.h"
+
 namespace cairn::match_features {
 namespace {
 
-constexpr char kSchema[] = "CREATE TABLE cairn_image_steps (idx INTEGER PRIMARY KEY NOT NULL, numbers BLOB)";
+constexpr char kSchema[] =
+    "CREATE TABLE IF NOT EXISTS cairn_image_steps (idx INTEGER PRIMARY KEY NOT NULL, numbers BLOB)";
+// An image costs less here than where its features are found.
+constexpr int64_t kImagesPerImage = 8;
 
 std::string_view BytesOf(const std::vector<int>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(int)};
@@ -49,18 +54,18 @@ Result<std::vector<int>> FindMissing(const ImageStep& step, const std::vector<in
   return missing;
 }
 
-Status WriteShare(const ImageStep& step, const std::vector<int>& share,
-                  const std::vector<std::vector<int>>& results, SQLite::Database& database, MatchRun* run) {
+Status WriteResults(const ImageStep& step, const std::vector<int>& idxs,
+                    const std::vector<std::vector<int>>& results, SQLite::Database& database, MatchRun* run) {
   database.exec(kSchema);
-  SQLite::Statement insert(database, "INSERT INTO cairn_image_steps VALUES (?, ?)");
-  for (const int idx : share) {
+  SQLite::Statement insert(database, "INSERT INTO cairn_image_steps (numbers) VALUES (?)");
+  for (const int idx : idxs) {
     CAIRN_ASSIGN_OR_RETURN(const ContentHash key, step.key(idx));
     const std::string_view bytes = BytesOf(results[idx]);
-    insert.bind(1, idx);
-    insert.bind(2, bytes.data(), static_cast<int>(bytes.size()));
+    insert.bind(1, bytes.data(), static_cast<int>(bytes.size()));
     insert.exec();
     insert.reset();
-    run->entries.push_back({.key = key, .contents = HashContents(bytes), .row = idx});
+    run->entries.push_back(
+        {.key = key, .contents = HashContents(bytes), .row = database.getLastInsertRowid()});
   }
   return Ok();
 }
@@ -68,26 +73,36 @@ Status WriteShare(const ImageStep& step, const std::vector<int>& share,
 }  // namespace
 
 Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageStep& step,
-                                                                  SQLite::Database* shard_database,
-                                                                  MatchRun* run) {
+                                                                  SQLite::Database* database, MatchRun* run) {
   std::vector<std::vector<int>> results(run->images.images.size());
   std::vector<int> all(results.size());
   std::iota(all.begin(), all.end(), 0);
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int> missing, FindMissing(step, all, &run->named, &results));
-  if (missing.empty() || shard_database == nullptr) {
+  const auto num_missing = static_cast<int64_t>(missing.size());
+  const int num_shards =
+      run->plan == nullptr
+          ? 0
+          : NumShardsOf(num_missing, kImagesPerImage * run->plan->min_num_images, run->plan->num_shards);
+  if (num_shards > 0) {
+    PlanImageStep(step.name, num_shards, *database, run);
+    run->summary.num_left_to_others = num_missing;
+    return std::optional<std::vector<std::vector<int>>>();
+  }
+  if (missing.empty() || !run->reuse.shard) {
     CAIRN_RETURN_IF_ERROR(Compute(step, missing, &results));
+    if (run->plan != nullptr) CAIRN_RETURN_IF_ERROR(WriteResults(step, missing, results, *database, run));
     return std::optional(std::move(results));
   }
-  const auto [begin, end] = ShareOf(*run->reuse.shard, static_cast<int64_t>(missing.size()));
+  const auto [begin, end] = ShareOf(*run->reuse.shard, num_missing);
   const std::vector<int> share(missing.begin() + begin, missing.begin() + end);
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int> to_compute,
                          FindMissing(step, share, &run->previous, &results));
   CAIRN_RETURN_IF_ERROR(Compute(step, to_compute, &results));
-  CAIRN_RETURN_IF_ERROR(WriteShare(step, share, results, *shard_database, run));
+  CAIRN_RETURN_IF_ERROR(WriteResults(step, share, results, *database, run));
   run->summary.image_step = step.name;
   run->summary.num_image_results = static_cast<int>(share.size());
   run->summary.num_taken_over = static_cast<int64_t>(share.size() - to_compute.size());
-  run->summary.num_left_to_others = static_cast<int64_t>(missing.size() - share.size());
+  run->summary.num_left_to_others = num_missing - std::ssize(share);
   return std::optional<std::vector<std::vector<int>>>();
 }
 

@@ -22,10 +22,10 @@ struct ImageStep {
 };
 
 // The results of all images, by index, taken over from reuse.files or computed.  A shard that lacks some
-// computes its share of them, writes it to the database and is done: nothing is returned.
-// REQUIRES: a database for a shard.  Errors: those of the step; throws SQLite::Exception.
+// computes its share of them, writes it to the database and is done: nothing is returned.  A plan leaves them
+// to shards, if there are enough, and returns nothing; otherwise it computes and writes them itself.
+// REQUIRES: a database for a shard and for a plan.  Errors: those of the step; throws SQLite::Exception.
 Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageStep& step,
-                                                                  SQLite::Database* shard_database,
-                                                                  MatchRun* run);
+                                                                  SQLite::Database* database, MatchRun* run);
 
 }  // namespace cairn::match_features

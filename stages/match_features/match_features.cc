@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -11,10 +10,11 @@
 #include "core/colmap/colmap_database.h"
 #include "core/files/file.h"
 #include "core/world/dropped_items.h"
+#include "stages/match_features/frustum_rounds.h"
 #include "stages/match_features/match_round.h"
-#include "stages/match_features/pairs/earlier_partners.h"
 #include "stages/match_features/pairs/pair_list.h"
 #include "stages/match_features/partners_by_looks.h"
+#include "stages/match_features/shard_plan.h"
 
 namespace cairn::match_features {
 namespace {
@@ -27,22 +27,8 @@ std::string ChooseMethod(const MatchImages& images, const MatchFeaturesOptions& 
   return num_images <= options.max_num_exhaustive_images ? "exhaustive" : "retrieval";
 }
 
-Result<std::vector<PosedCamera>> PosedCameras(const MatchImages& images) {
-  std::vector<PosedCamera> posed;
-  for (const MatchImage& image : images.images) {
-    if (!image.cam_from_world) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "pairs = frustum needs a pose for every image, but {} has none; give --capture, or "
-                       "choose pairs = retrieval or exhaustive",
-                       image.name);
-    }
-    posed.push_back({images.cameras.at(image.camera_id), *image.cam_from_world});
-  }
-  return posed;
-}
-
 // Each image with its neighbours in the order of names, and with loop candidates.
-Result<std::optional<IndexPairs>> SelectSequencePairs(SQLite::Database* shard_database, MatchRun* run) {
+Result<std::optional<IndexPairs>> SelectSequencePairs(SQLite::Database* database, MatchRun* run) {
   const MatchFeaturesOptions& options = run->options;
   std::vector<std::string> names;
   for (const MatchImage& image : run->images.images) names.push_back(image.name);
@@ -57,7 +43,7 @@ Result<std::optional<IndexPairs>> SelectSequencePairs(SQLite::Database* shard_da
                             return LoopPartners(similarity, idxs, order, options.sequence_window,
                                                 options.num_loop_candidates, run->num_threads);
                           }};
-  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, shard_database, run));
+  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, database, run));
   if (!partners) return std::optional<IndexPairs>();
   const IndexPairs loops = PairsFromPartners(*partners);
   pairs.insert(pairs.end(), loops.begin(), loops.end());
@@ -65,20 +51,20 @@ Result<std::optional<IndexPairs>> SelectSequencePairs(SQLite::Database* shard_da
   return std::optional(std::move(pairs));
 }
 
-Result<std::optional<IndexPairs>> SelectRetrievedPairs(SQLite::Database* shard_database, MatchRun* run) {
+Result<std::optional<IndexPairs>> SelectRetrievedPairs(SQLite::Database* database, MatchRun* run) {
   const int num_retrieved = run->options.num_retrieved;
   const LooksRule rule = {.key = ContentHasher().Text("retrieved").UInt(num_retrieved).Finish(),
                           .partners = [&](const ImageSimilarity& similarity, const std::vector<int>& idxs) {
                             return RetrievedPartners(similarity, idxs, num_retrieved, run->num_threads);
                           }};
-  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, shard_database, run));
+  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, database, run));
   if (!partners) return std::optional<IndexPairs>();
   return std::optional(PairsFromPartners(*partners));
 }
 
 // Pairs by every method but frustum.  Nothing where the run is a shard that has computed its share of
-// choosing them and written it to its database.
-Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, MatchRun* run) {
+// choosing them and written it to its database, or a plan that has left it to shards.
+Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* database, MatchRun* run) {
   const std::string& method = run->summary.pairs;
   if (method == "list") {
     CAIRN_ASSIGN_OR_RETURN(PairList list, ReadPairList(run->inputs.pair_list_path, run->images));
@@ -86,139 +72,7 @@ Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, 
   }
   if (method == "exhaustive")
     return std::optional(ExhaustivePairs(static_cast<int>(run->images.images.size())));
-  return method == "sequence" ? SelectSequencePairs(shard_database, run)
-                              : SelectRetrievedPairs(shard_database, run);
-}
-
-// What the predictor reads of the images, in the world frame.
-Status AddViews(const MatchRun& run, PairPredictor* predictor) {
-  for (const MatchImage& image : run.images.images) {
-    if (run.progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
-    const Camera& camera = run.images.cameras.at(image.camera_id);
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> bearings,
-                           ReadImageBearings(run.features, image, camera));
-    PairPredictor::View view;
-    view.center = image.cam_from_world->Center();
-    view.focal_px = camera.MeanFocal();
-    view.generation = GenerationOfSession(image.session);
-    const Eigen::Quaterniond world_from_cam = image.cam_from_world->rotation.conjugate();
-    for (const Eigen::Vector3d& bearing : bearings)
-      view.rays.push_back((world_from_cam * bearing).cast<float>());
-    predictor->AddView(view);
-  }
-  return Ok();
-}
-
-// What was predicted of earlier sessions may be known.
-Result<PredictionReuse> ReusePredictions(const PredictPairsOptions& options, MatchRun* run) {
-  std::vector<ContentHash> image_keys;
-  std::vector<int> generations;
-  for (const MatchImage& image : run->images.images) {
-    CAIRN_ASSIGN_OR_RETURN(const ContentHash image_key,
-                           run->keys.OfImage(static_cast<int>(image_keys.size())));
-    ContentHasher hasher;
-    hasher.Hash(image_key);
-    for (const double value : image.cam_from_world->rotation.coeffs()) hasher.Double(value);
-    for (const double value : image.cam_from_world->translation) hasher.Double(value);
-    image_keys.push_back(hasher.Finish());
-    generations.push_back(GenerationOfSession(image.session));
-  }
-  return PredictionReuse(image_keys, std::move(generations), options);
-}
-
-// Pairs, ascending, that the matches so far predict, and that are not known.
-Result<std::vector<PredictedPair>> PredictOrTakeOver(const IndexPairs& known,
-                                                     const PredictPairsOptions& options,
-                                                     PairPredictor* predictor, SQLite::Database& database,
-                                                     MatchRun* run) {
-  if (!run->predictions) return predictor->Predict(known, options, run->num_threads, run->progress);
-  std::vector<PredictedPair> pairs;
-  std::set<int> taken_over;
-  const std::vector<int> generations = run->predictions->EndRound();
-  for (const int generation : generations) {
-    for (ReuseSources* const sources : {&run->named, &run->previous}) {
-      const auto found = run->predictions->Find(generation, sources);
-      if (!found) continue;
-      pairs.insert(pairs.end(), found->begin(), found->end());
-      taken_over.insert(generation);
-      ++run->summary.num_predictions_taken_over;
-      break;
-    }
-  }
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<PredictedPair> computed,
-                         predictor->Predict(known, options, run->num_threads, run->progress, taken_over));
-  pairs.insert(pairs.end(), computed.begin(), computed.end());
-  std::sort(pairs.begin(), pairs.end(),
-            [](const PredictedPair& a, const PredictedPair& b) { return a.idxs < b.idxs; });
-  for (const int generation : generations)
-    run->entries.push_back(run->predictions->Write(generation, pairs, database));
-  return pairs;
-}
-
-EarlierPartners PartnersBySession(const MatchImages& images, double ratio) {
-  std::vector<int> sessions;
-  for (const MatchImage& image : images.images) sessions.push_back(image.session);
-  return {std::move(sessions), ratio};
-}
-
-// All pairs whose frusta overlap.
-Result<IndexPairs> OverlappingPairs(const std::vector<PosedCamera>& posed, const MatchRun& run) {
-  std::vector<std::vector<int>> partners(posed.size());
-  CAIRN_RETURN_IF_ERROR(RankOverlaps(posed, run.options.frustum, run.num_threads, run.progress,
-                                     [&](int idx, const std::vector<OverlapPartner>& ranked) {
-                                       for (const OverlapPartner& partner : ranked) {
-                                         if (partner.idx > idx) partners[idx].push_back(partner.idx);
-                                       }
-                                     }));
-  return PairsFromPartners(partners);
-}
-
-// The pairs of largest overlap.
-Result<IndexPairs> SeedPairs(const std::vector<PosedCamera>& posed, const MatchRun& run,
-                             EarlierPartners* partners) {
-  const MatchFeaturesOptions& options = run.options;
-  std::vector<EarlierPartners::Seeds> seeds(posed.size());
-  CAIRN_RETURN_IF_ERROR(RankOverlaps(posed, options.frustum, run.num_threads, run.progress,
-                                     [&](int idx, const std::vector<OverlapPartner>& ranked) {
-                                       seeds[idx] = partners->SeedsOf(idx, ranked, options.num_frustum_seeds,
-                                                                      options.num_frustum_scouts);
-                                     }));
-  return partners->TakeSeeds(seeds);
-}
-
-// Matches the pairs of largest overlap, then repeatedly those that the matches so far predict.
-Status MatchFrustum(const std::string& matches_path, SQLite::Database& database, MatchRun* run) {
-  const MatchFeaturesOptions& options = run->options;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<PosedCamera> posed, PosedCameras(run->images));
-  if (options.num_frustum_seeds == 0) {
-    CAIRN_ASSIGN_OR_RETURN(IndexPairs pairs, OverlappingPairs(posed, *run));
-    CAIRN_RETURN_IF_ERROR(MatchRound(std::move(pairs), nullptr, database, run));
-    return Ok();
-  }
-  EarlierPartners partners = PartnersBySession(run->images, options.earlier_partners_ratio);
-  CAIRN_ASSIGN_OR_RETURN(IndexPairs next, SeedPairs(posed, *run, &partners));
-  PairPredictor predictor(matches_path, int64_t{options.matching.memory_budget_mib} << 20);
-  CAIRN_RETURN_IF_ERROR(AddViews(*run, &predictor));
-  const PredictPairsOptions prediction = {
-      .min_num_expected_matches = options.min_num_expected_matches,
-      .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
-      .max_prior_error_px = options.matching.verification.max_prior_error_px,
-      .min_baseline_m = options.matching.verification.min_baseline_m};
-  if (!run->reuse.shard) {
-    CAIRN_ASSIGN_OR_RETURN(run->predictions, ReusePredictions(prediction, run));
-    CreatePredictionTable(database);
-  }
-  IndexPairs known = next;
-  while (!next.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(const bool goes_on, MatchRound(next, &predictor, database, run));
-    if (!goes_on) break;
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<PredictedPair> predicted,
-                           PredictOrTakeOver(known, prediction, &predictor, database, run));
-    for (const PredictedPair& pair : predicted) known.push_back(pair.idxs);
-    std::sort(known.begin(), known.end());
-    next = partners.Choose(predicted);
-  }
-  return Ok();
+  return method == "sequence" ? SelectSequencePairs(database, run) : SelectRetrievedPairs(database, run);
 }
 
 Status CheckRanges(const MatchFeaturesOptions& options) {
@@ -300,16 +154,76 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
   });
 }
 
+// The pairs of one round after the other, or what is to be known before, as far as a shard or a plan goes.
+Status GoThroughRounds(const std::string& matches_path, SQLite::Database& database, MatchRun* run) {
+  if (run->images.images.size() < 2) return Ok();
+  if (run->summary.pairs == "frustum") return MatchFrustum(matches_path, database, run);
+  CAIRN_ASSIGN_OR_RETURN(std::optional<IndexPairs> pairs, SelectPairs(&database, run));
+  if (pairs) CAIRN_RETURN_IF_ERROR(MatchRound(std::move(*pairs), nullptr, database, run));
+  return Ok();
+}
+
 // Only the shard's results, without features.
 Status WriteShard(const std::string& matches_path, MatchRun* run) {
   return WriteDatabase(matches_path, kColmapSchema, [&](SQLite::Database& database) -> Status {
-    if (run->images.images.size() < 2) return Ok();
-    if (run->summary.pairs == "frustum") return MatchFrustum(matches_path, database, run);
-    CAIRN_ASSIGN_OR_RETURN(std::optional<IndexPairs> pairs, SelectPairs(&database, run));
-    if (!pairs) return Ok();
-    CAIRN_RETURN_IF_ERROR(MatchRound(std::move(*pairs), nullptr, database, run));
-    return Ok();
+    return run->planned ? MatchPlanned(*run->planned, database, run)
+                        : GoThroughRounds(matches_path, database, run);
   });
+}
+
+Status WritePlan(const std::string& plan_path, MatchRun* run) {
+  CAIRN_RETURN_IF_ERROR(WriteDatabase(plan_path, kShardPlanSchema, [&](SQLite::Database& database) -> Status {
+    CAIRN_RETURN_IF_ERROR(GoThroughRounds(plan_path, database, run));
+    if (!run->is_planned) PlanPairs({}, database, run);  // all are known
+    return Ok();
+  }));
+  return WriteFileAtomically(
+      plan_path + kNumShardsSuffix,
+      fmt::format("{}{}\n", run->summary.num_shards_with_work, IsLastPlan(run->summary) ? " last" : ""));
+}
+
+// `path`: of what the run writes.
+Result<MatchFeaturesSummary> RunMatching(const MatchFeaturesInputs& inputs,
+                                         const MatchFeaturesOptions& options, const std::string& path,
+                                         uint64_t seed, int num_threads, Progress& progress,
+                                         const ReuseOptions& reuse, const PlanOptions* plan) {
+  CAIRN_RETURN_IF_ERROR(CheckRanges(options));
+  const std::string& features_path = inputs.features_path;
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenColmapDatabase(features_path));
+  const auto images =
+      WithDatabaseErrors(features_path, [&] { return ReadMatchImages(features, inputs.capture); });
+  if (!images.ok()) return images.error();
+  const MatchFeaturesOptions bounded = WithMemoryForFeatures(options, images->images.size());
+  MatchRun run{.features = features,
+               .images = *images,
+               .inputs = inputs,
+               .options = bounded,
+               .reuse = reuse,
+               .plan = plan,
+               .seed = seed,
+               .num_threads = num_threads,
+               .progress = progress,
+               .keys = PairKeys(features, *images, options.matching)};
+  MatchFeaturesSummary& summary = run.summary;
+  summary.num_images = static_cast<int>(images->images.size());
+  summary.num_without_features = static_cast<int>(images->without_features.size());
+  if (summary.num_images < 2 && !reuse.shard && plan == nullptr) {
+    return MakeError(ErrorCode::kNoData, "{}: {} image(s) with features, at least 2 are needed to match",
+                     features_path, summary.num_images);
+  }
+  ReuseOptions sources = reuse;
+  if (reuse.shard && !inputs.plan_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(run.planned, ReadPlannedPairs(inputs.plan_path, *reuse.shard, *images));
+    if (run.planned) sources.files.clear();  // the plan knows what they have
+  }
+  CAIRN_ASSIGN_OR_RETURN(summary.not_reused, AddReuseSources(sources, path, &run.named, &run.previous));
+  cv::setNumThreads(1);  // pairs are the unit of parallel work
+  summary.pairs = inputs.pair_list_path.empty() ? ChooseMethod(*images, options) : "list";
+  CAIRN_RETURN_IF_ERROR(plan != nullptr ? WritePlan(path, &run)
+                        : reuse.shard   ? WriteShard(path, &run)
+                                        : WriteMatches(path, &run));
+  CAIRN_RETURN_IF_ERROR(WriteReuseFile(path, std::move(run.entries)));
+  return std::move(summary);
 }
 
 }  // namespace
@@ -318,34 +232,14 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const MatchFeaturesOptions& options,
                                            const std::string& matches_path, uint64_t seed, int num_threads,
                                            Progress& progress, const ReuseOptions& reuse) {
-  CAIRN_RETURN_IF_ERROR(CheckRanges(options));
-  const std::string& path = inputs.features_path;
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenColmapDatabase(path));
-  const auto images = WithDatabaseErrors(path, [&] { return ReadMatchImages(features, inputs.capture); });
-  if (!images.ok()) return images.error();
-  const MatchFeaturesOptions bounded = WithMemoryForFeatures(options, images->images.size());
-  MatchRun run{.features = features,
-               .images = *images,
-               .inputs = inputs,
-               .options = bounded,
-               .reuse = reuse,
-               .seed = seed,
-               .num_threads = num_threads,
-               .progress = progress,
-               .keys = PairKeys(features, *images, options.matching)};
-  MatchFeaturesSummary& summary = run.summary;
-  summary.num_images = static_cast<int>(images->images.size());
-  summary.num_without_features = static_cast<int>(images->without_features.size());
-  if (summary.num_images < 2 && !reuse.shard) {
-    return MakeError(ErrorCode::kNoData, "{}: {} image(s) with features, at least 2 are needed to match",
-                     path, summary.num_images);
-  }
-  CAIRN_ASSIGN_OR_RETURN(summary.not_reused, AddReuseSources(reuse, matches_path, &run.named, &run.previous));
-  cv::setNumThreads(1);  // pairs are the unit of parallel work
-  summary.pairs = inputs.pair_list_path.empty() ? ChooseMethod(*images, options) : "list";
-  CAIRN_RETURN_IF_ERROR(reuse.shard ? WriteShard(matches_path, &run) : WriteMatches(matches_path, &run));
-  CAIRN_RETURN_IF_ERROR(WriteReuseFile(matches_path, std::move(run.entries)));
-  return std::move(summary);
+  return RunMatching(inputs, options, matches_path, seed, num_threads, progress, reuse, nullptr);
+}
+
+Result<MatchFeaturesSummary> PlanShards(const MatchFeaturesInputs& inputs,
+                                        const MatchFeaturesOptions& options, const PlanOptions& plan,
+                                        const std::string& plan_path, uint64_t seed, int num_threads,
+                                        Progress& progress, const ReuseOptions& reuse) {
+  return RunMatching(inputs, options, plan_path, seed, num_threads, progress, reuse, &plan);
 }
 
 }  // namespace cairn::match_features

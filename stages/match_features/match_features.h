@@ -9,8 +9,8 @@
 #include "core/line/reuse.h"
 #include "core/options/options.h"
 #include "core/world/feature_class.h"
-#include "stages/match_features/match_pairs.h"
 #include "stages/match_features/pairs/frustum_overlap.h"
+#include "stages/match_features/two_views/match_pairs.h"
 
 namespace cairn::match_features {
 
@@ -60,6 +60,15 @@ struct MatchFeaturesInputs {
   const Capture* capture = nullptr;  // its poses, by image name; none: pairs are verified from matches alone
   std::string vocabulary_path;  // for retrieval and loops; empty: a tree is grown from the images at hand
   std::string pair_list_path;   // replaces options.pairs (pair_list.h); empty: none
+  std::string plan_path;        // a shard's, of PlanShards; empty: the shard finds out what its share is
+};
+
+// How a run plans what shards do.
+struct PlanOptions {
+  int num_shards = 0;  // REQUIRES: >= 1
+  // Fewest images of a shard that work on images, or the number of pairs that take as long: of less work, or
+  // of a round with less, fewer shards have a part, or none.  REQUIRES: >= 1
+  int min_num_images = 64;
 };
 
 struct MatchFeaturesSummary {
@@ -74,10 +83,12 @@ struct MatchFeaturesSummary {
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
   int num_predictions_taken_over = 0;  // rounds of a generation (pairs/earlier_partners.h)
   int num_rounds = 0;  // of pairs; after a shard's last round the pairs of the next are not known yet
-  // What a shard worked on instead of pairs, to choose them: "words" or "partners" of images; empty: nothing.
+  // What a shard worked on, or is to work on, instead of pairs, to choose them: "seeds" or "overlaps",
+  // "words" or "partners" of images; empty: nothing.
   std::string image_step;
   int num_image_results = 0;
   int64_t num_left_to_others = 0;       // pairs, or images, of a shard's last round that other shards work on
+  int num_shards_with_work = 0;         // by a plan
   std::vector<std::string> not_reused;  // why earlier outputs gave no results
 };
 
@@ -87,10 +98,11 @@ struct MatchFeaturesSummary {
 // with the same options: same bytes as without.  Same bytes for any number of threads and any memory
 // budget.  O(pairs * features^2).
 //
-// A shard goes through the rounds of pairs with the results in `reuse.files` (and before these, where pairs
-// are those that look alike, through the words of the images and their partners).  Of the first round that
-// the files do not have completely, it matches its share of the missing pairs, a contiguous stretch of the
-// order in which pairs are matched, and writes a database with these pairs only; it may have none.
+// A shard matches the pairs that inputs.plan_path has for it, and writes a database with these pairs only; it
+// may have none.  Without a plan it goes through the rounds of pairs with the results in `reuse.files` (and
+// before these through the steps by which pairs are chosen: an image's seeds, or its words and its
+// partners).  Of the first round that the files do not have completely, it matches its share of the missing
+// pairs, a contiguous stretch of the order in which pairs are matched.
 //
 // Errors: Corrupt (a database), NoData (fewer than two images with features, no pair verified, a vocabulary
 // without words), InvalidArgument (options; a line of the pair list), Io, Cancelled; of
@@ -99,5 +111,15 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const MatchFeaturesOptions& options,
                                            const std::string& matches_path, uint64_t seed, int num_threads,
                                            Progress& progress, const ReuseOptions& reuse = {});
+
+// Goes through the rounds of pairs with the results in `reuse.files`, and plans the first that they do not
+// have completely: `plan_path` says which pairs each shard matches, and plan_path.shards how many of them
+// have work ("3"), and whether the rest will be too little for another plan ("3 last").  What the plan itself
+// found out (seeds, predicted pairs) is taken over where it is among the files of a later run.  Errors: as
+// MatchFeatures.
+Result<MatchFeaturesSummary> PlanShards(const MatchFeaturesInputs& inputs,
+                                        const MatchFeaturesOptions& options, const PlanOptions& plan,
+                                        const std::string& plan_path, uint64_t seed, int num_threads,
+                                        Progress& progress, const ReuseOptions& reuse);
 
 }  // namespace cairn::match_features

@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include "stages/match_features/shard_plan.h"
+
 namespace cairn::match_features {
 namespace {
 
@@ -142,26 +144,36 @@ Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Data
                         MatchRun* run) {
   SortAlongCurve(&pairs);
   ++run->summary.num_rounds;
-  if (!run->reuse.shard) {
+  if (!run->reuse.shard && run->plan == nullptr) {
     CAIRN_RETURN_IF_ERROR(WritePairs(pairs, {&run->named, &run->previous}, predictor, database, run));
     return true;
   }
   CAIRN_ASSIGN_OR_RETURN(Found found, FindPairs(pairs, {&run->named}, run));
-  const std::vector<size_t>& missing = found.missing;
-  if (missing.empty()) {
+  if (found.missing.empty()) {
     CAIRN_RETURN_IF_ERROR(TakeOver(pairs, 0, pairs.size(), {&run->named}, &found.held, run,
                                    [&](const std::pair<int, int>& pair, const PairResult& result) {
                                      TellPredictor(pair, result, predictor);
+                                     if (run->predictions)
+                                       run->predictions->Add(pair, EntryOf({}, result).contents);
                                      return Ok();
                                    }));
     return true;
   }
+  IndexPairs missing;
+  for (const size_t i : found.missing) missing.push_back(pairs[i]);
+  if (run->plan != nullptr) {
+    PlanPairs(missing, database, run);
+    return false;
+  }
   const auto [begin, end] = ShareOf(*run->reuse.shard, static_cast<int64_t>(missing.size()));
-  IndexPairs share;
-  for (int64_t i = begin; i < end; ++i) share.push_back(pairs[missing[i]]);
+  const IndexPairs share(missing.begin() + begin, missing.begin() + end);
   run->summary.num_left_to_others = static_cast<int64_t>(missing.size() - share.size());
   CAIRN_RETURN_IF_ERROR(WritePairs(share, {&run->previous}, nullptr, database, run));
   return false;
+}
+
+Status MatchPlanned(const IndexPairs& pairs, SQLite::Database& database, MatchRun* run) {
+  return WritePairs(pairs, {&run->previous}, nullptr, database, run);
 }
 
 }  // namespace cairn::match_features

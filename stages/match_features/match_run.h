@@ -20,6 +20,7 @@ struct MatchRun {
   const MatchFeaturesInputs& inputs;
   const MatchFeaturesOptions& options;
   const ReuseOptions& reuse;
+  const PlanOptions* plan;  // of a planning run; otherwise none
   uint64_t seed;
   int num_threads;
   Progress& progress;
@@ -27,6 +28,8 @@ struct MatchRun {
   ReuseSources named;                          // reuse.files
   ReuseSources previous;                       // the output's earlier state
   std::optional<PredictionReuse> predictions;  // where pairs are predicted; a shard has none
+  std::optional<IndexPairs> planned;           // what a plan has for the shard
+  bool is_planned = false;                     // the plan has been made
   std::vector<ReuseEntry> entries;
   std::vector<DroppedItem> dropped_pairs;  // those tried and not verified
   MatchFeaturesSummary summary;

@@ -8,8 +8,8 @@
 #include "core/base/error.h"
 #include "core/colmap/colmap_database.h"
 #include "core/line/reuse.h"
-#include "stages/match_features/match_pairs.h"
 #include "stages/match_features/pairs/image_features.h"
+#include "stages/match_features/two_views/match_pairs.h"
 
 namespace cairn::match_features {
 

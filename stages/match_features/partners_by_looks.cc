@@ -50,14 +50,14 @@ ImageStep PartnersStep(const LooksRule& rule, const std::vector<std::vector<Word
 }  // namespace
 
 Result<std::optional<std::vector<std::vector<int>>>> PartnersByLooks(const LooksRule& rule,
-                                                                     SQLite::Database* shard_database,
+                                                                     SQLite::Database* database,
                                                                      MatchRun* run) {
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
                          VocabularyForRetrieval(run->features, run->images, run->inputs.vocabulary_path,
                                                 run->seed, run->num_threads, run->progress));
-  CAIRN_ASSIGN_OR_RETURN(const auto words, RunImageStep(WordsStep(vocabulary, run), shard_database, run));
+  CAIRN_ASSIGN_OR_RETURN(const auto words, RunImageStep(WordsStep(vocabulary, run), database, run));
   if (!words) return std::optional<std::vector<std::vector<int>>>();
-  return RunImageStep(PartnersStep(rule, *words, vocabulary.num_words()), shard_database, run);
+  return RunImageStep(PartnersStep(rule, *words, vocabulary.num_words()), database, run);
 }
 
 }  // namespace cairn::match_features

@@ -24,7 +24,7 @@ struct LooksRule {
 // The partners of all images, in two steps that are divided among shards (image_step.h): the words of each
 // image, then its partners.  Errors: those of retrieve_pairs.h.
 Result<std::optional<std::vector<std::vector<int>>>> PartnersByLooks(const LooksRule& rule,
-                                                                     SQLite::Database* shard_database,
+                                                                     SQLite::Database* database,
                                                                      MatchRun* run);
 
 }  // namespace cairn::match_features

@@ -58,7 +58,7 @@ class Cluster : public testing::Test {
 
   static std::string Compile(const std::string& name, const std::string& launcher,
                              const std::string& recipe = "capture.toml") {
-    return fmt::format("SLURM_CONF={} cairn compile {} -o {} --shards 6 -j 4 --launch '{}'",
+    return fmt::format("SLURM_CONF={} cairn compile {} -o {} --shards 6 --shard-images 2 -j 4 --launch '{}'",
                        *folder_ / "slurm/slurm.conf", *folder_ / recipe, *folder_ / name, launcher);
   }
 
@@ -76,7 +76,9 @@ class Cluster : public testing::Test {
           << file;
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(*folder_ / (name + ".build"))) {
-      EXPECT_THAT(entry.path().filename().string(), testing::Not(HasSubstr("of6"))) << "left by a shard";
+      EXPECT_THAT(entry.path().filename().string(),
+                  testing::Not(testing::AnyOf(HasSubstr("of6"), HasSubstr("-plan"))))
+          << "left by a shard";
     }
   }
 
@@ -88,6 +90,9 @@ TEST_F(Cluster, ShardsOnFourNodesGiveTheBytesOfOneMachine) {
   const ProgramRun run = RunShell(Compile("sharded.cairn", Launcher()));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(NodesUsed(), SizeIs(4));
+  EXPECT_THAT(run.out, testing::AllOf(HasSubstr("extract_features: shard 6/6"),
+                                      HasSubstr("match_features: plan for 6 shards"),
+                                      HasSubstr("match_features: shard 2/")));
   ExpectSameBytesAsLocal("sharded");
   const ProgramRun again = RunShell(Compile("sharded.cairn", Launcher()));
   EXPECT_THAT(again.out, HasSubstr("up to date"));

@@ -93,7 +93,8 @@ TEST_F(Hostile, EnvironmentOfTheCallerDoesNotReachMake) {
       "LAUNCH='touch PWNED;' SHELL=$PWD/evil.sh BASH_ENV=$PWD/evil.sh ENV=$PWD/evil.sh MAKE=./evil.sh "
       "SESSION_LIST=" +
       touch + " RECIPE=" + touch + " FRAME=" + touch + " VIEWS=" + touch + " SHARD_ROUNDS=" + touch +
-      " CAIRN_FLAGS=" + touch + " CAPTURE_LISTS=" + touch + " SHARDS=3 BUILD=/nowhere CAIRN=/bin/false ";
+      " SHARD_IMAGES=" + touch + " CAIRN_FLAGS=" + touch + " CAPTURE_LISTS=" + touch +
+      " SHARDS=3 BUILD=/nowhere CAIRN=/bin/false ";
   const ProgramRun run = Run(environment + "cairn compile tiny.toml -o a.cairn --until simulate");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(fs::exists(folder_ / "a.build/capture/images.txt"));

@@ -90,6 +90,35 @@ TEST_F(TakeOver, ShardsMergeToTheSameBytes) {
   EXPECT_THAT(merged.out, Not(HasSubstr(", 0 taken over")));
 }
 
+TEST_F(TakeOver, PlannedShardsMergeToTheSameBytes) {
+  ASSERT_EQ(Extract("features.db", "--no-reuse").exit_code, 0);
+  ASSERT_EQ(Match("matches.db", "--no-reuse").exit_code, 0);
+  EXPECT_THAT(Match("plan.db", "--plan 3").out,
+              HasSubstr("plan for 3 shards: round 1 of pairs (frustum): too little"));
+  EXPECT_THAT(Match("plan.db", "--plan 2 --shard-images 1").out,
+              HasSubstr("plan for 2 shards: seeds of images: 23 left to 2 of them"));
+  std::vector<std::string> files = {"plan.db"};
+  for (const char* i : {"1", "2"}) {
+    files.push_back(std::string("seeds") + i + ".db");
+    EXPECT_THAT(Match(files.back(), "--planned " + Path("plan.db") + " --shard " + i + "/2").out,
+                HasSubstr(std::string("shard ") + i + "/2: seeds of 1"));
+  }
+  const std::string known = Reuse(files);
+  EXPECT_THAT(Match("plan2.db", "--plan 2 --shard-images 1" + known).out, HasSubstr("left to 2 of them"));
+  files.emplace_back("plan2.db");
+  for (const char* i : {"1", "2"}) {
+    files.push_back(std::string("pairs") + i + ".db");
+    EXPECT_THAT(Match(files.back(), "--planned " + Path("plan2.db") + " --shard " + i + "/2" + known).out,
+                HasSubstr(std::string("shard ") + i + "/2: pairs (frustum): "));
+  }
+  const ProgramRun merged = Match("merged_matches.db", Reuse(files));
+  EXPECT_EQ(*HashFile(Path("merged_matches.db")), *HashFile(Path("matches.db"))) << merged.err;
+  EXPECT_THAT(merged.out, Not(HasSubstr(", 0 taken over")));
+  const ProgramRun other = Match("bad.db", "--planned " + Path("plan2.db") + " --shard 1/3");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("a plan for 2 shards, but this is one of 3"));
+}
+
 TEST_F(TakeOver, BadArgumentsAreRefused) {
   for (const char* shard : {"0/3", "4/3", "x", "3", "1/3/3"}) {
     const ProgramRun run = Extract("bad.db", std::string("--shard ") + shard);
@@ -103,6 +132,10 @@ TEST_F(TakeOver, BadArgumentsAreRefused) {
   EXPECT_EQ(Extract("bad.db", Reuse({"absent.db"})).exit_code, 3);
   EXPECT_EQ(Extract("bad.db", Reuse({"simulated.toml"})).exit_code, 4);
   EXPECT_EQ(Extract("bad.db", Reuse({"features.db"}) + " --no-reuse").exit_code, 2);
+  EXPECT_THAT(Match("bad.db", "--planned " + Path("features.db")).err, HasSubstr("--shard I/N"));
+  EXPECT_EQ(Match("bad.db", "--plan 2 --shard 1/2").exit_code, 2);
+  EXPECT_EQ(Match("bad.db", "--plan 0").exit_code, 2);
+  EXPECT_EQ(Match("bad.db", "--plan 2 --shard-images 0").exit_code, 2);
   EXPECT_FALSE(fs::exists(Path("bad.db")));
 }
 

@@ -64,6 +64,18 @@ class MatchFeaturesTest : public testing::Test {
     ASSERT_TRUE(status.ok()) << status.error().message;
   }
 
+  // Images from this one on show another place, so that words tell images apart.
+  void ShowAnotherPlace(int first_image_id) {
+    Random random(11);
+    std::string bytes(80 * kSiftDescriptorDim, '\0');
+    for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
+    SQLite::Database database(folder_ + "/features.db", SQLite::OPEN_READWRITE);
+    SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id >= ?");
+    update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+    update.bind(2, first_image_id);
+    update.exec();
+  }
+
   Result<MatchFeaturesSummary> Match(bool with_poses, int num_threads = 2) {
     return MatchTo("matches.db", with_poses, {}, num_threads);
   }

@@ -4,6 +4,8 @@
 #include <random>
 
 #include <gmock/gmock.h>
+#include <numeric>
+
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
@@ -32,10 +34,12 @@ using Ranking = std::vector<std::vector<OverlapPartner>>;  // of each image
 Ranking Rank(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options = {}) {
   NoProgress progress;
   Ranking ranking(images.size());
+  std::vector<int> idxs(images.size());
+  std::iota(idxs.begin(), idxs.end(), 0);
   EXPECT_TRUE(
-      RankOverlaps(images, options, 2, progress, [&](int idx, const std::vector<OverlapPartner>& partners) {
-        ranking[idx] = partners;
-      }).ok());
+      RankOverlaps(images, idxs, options, 2, progress,
+                   [&](int idx, const std::vector<OverlapPartner>& partners) { ranking[idx] = partners; })
+          .ok());
   return ranking;
 }
 

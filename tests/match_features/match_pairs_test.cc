@@ -1,4 +1,4 @@
-#include "stages/match_features/match_pairs.h"
+#include "stages/match_features/two_views/match_pairs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -32,16 +32,6 @@ class MatchFeaturesReuse : public MatchFeaturesTest {
                     "UPDATE descriptors SET rows = 79, data = substr(data, 1, 79 * 128) WHERE image_id = {0}",
                     image_id));
   }
-  // Images 5 to 8 show another place, so that words tell images apart.
-  void MoveLastImages() {
-    Random random(11);
-    std::string bytes(80 * kSiftDescriptorDim, '\0');
-    for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
-    SQLite::Database database(folder_ + "/features.db", SQLite::OPEN_READWRITE);
-    SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 4");
-    update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
-    update.exec();
-  }
   void ExpectAsClean(const std::string& name, bool with_poses) {
     const auto clean = MatchTo("clean.db", with_poses, {}, 1);
     ASSERT_TRUE(clean.ok()) << clean.error().message;
@@ -251,7 +241,7 @@ TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesThroughTheRoundsOfFrustum) {
   const auto merged = MatchTo("merged.db", true, {.files = files});
   ASSERT_TRUE(merged.ok()) << merged.error().message;
   EXPECT_EQ(merged->num_taken_over, merged->num_pairs_tried);
-  EXPECT_EQ(merged->num_rounds, num_rounds);
+  EXPECT_EQ(merged->num_rounds, num_rounds - 1) << "in the first the seeds were chosen";
   ExpectAsClean("merged.db", true);
 
   fs::remove(files[1]);  // a node died in the first round
@@ -266,7 +256,7 @@ TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesThroughTheRoundsOfFrustum) {
 }
 
 TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesWherePairsLookAlike) {
-  MoveLastImages();
+  ShowAnotherPlace(5);
   options_.num_retrieved = 3;
   options_.sequence_window = 2;
   options_.num_loop_candidates = 2;
@@ -288,7 +278,7 @@ TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesWherePairsLookAlike) {
 }
 
 TEST_F(MatchFeaturesReuse, AnotherSeedOrVocabularyMakesOtherWords) {
-  MoveLastImages();
+  ShowAnotherPlace(5);
   options_.pairs = "retrieval";
   ASSERT_EQ(MatchTo("a.db", false, {.shard = Shard{1, 1}})->image_step, "words");
   const ReuseOptions again{.files = {folder_ + "/a.db"}, .shard = Shard{1, 1}};

@@ -6,7 +6,7 @@
 
 #include "core/base/pooled.h"
 #include "core/base/random.h"
-#include "stages/match_features/verify_pair.h"
+#include "stages/match_features/two_views/verify_pair.h"
 
 namespace cairn::match_features {
 

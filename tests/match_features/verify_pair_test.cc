@@ -1,4 +1,4 @@
-#include "stages/match_features/verify_pair.h"
+#include "stages/match_features/two_views/verify_pair.h"
 
 #include <limits>
 

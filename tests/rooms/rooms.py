@@ -21,7 +21,7 @@ runtime/map runtime/localize runtime/track runtime/scans runtime/laser runtime/p
 sim/render sim/survey sim/robot sim/worlds
 stages/simulate
 stages/extract_features
-stages/match_features/pairs stages/match_features
+stages/match_features/pairs stages/match_features/two_views stages/match_features
 stages/reconstruct/view_graph stages/reconstruct/globally stages/reconstruct/registration stages/reconstruct/inertial stages/reconstruct/verdict stages/reconstruct/by_colmap stages/reconstruct
 stages/group_classes/persistence stages/group_classes/tracks stages/group_classes/adjust stages/group_classes
 stages/filter_visibility

@@ -264,8 +264,9 @@ double FrustumOverlap(const PosedCamera& image1, const PosedCamera& image2,
   return OverlapCounter(options).Overlap(placed[0], placed[1]);
 }
 
-Status RankOverlaps(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,
-                    int num_threads, Progress& progress, const TakeRanking& take) {
+Status RankOverlaps(const std::vector<PosedCamera>& images, const std::vector<int>& idxs,
+                    const FrustumOverlapOptions& options, int num_threads, Progress& progress,
+                    const TakeRanking& take) {
   const int num_images = static_cast<int>(images.size());
   const PlacedImages placed(images, options);
   const std::vector<Eigen::Vector3d> centers = placed.Centers();
@@ -273,10 +274,10 @@ Status RankOverlaps(const std::vector<PosedCamera>& images, const FrustumOverlap
   // Without a smallest overlap all images are partners of all others.
   const bool has_reach = options.min_overlap_ratio > 0 && reach_m > 0;
   const PointGrid grid(centers, has_reach ? reach_m : 1.0);
-  progress.Begin("rank overlaps", num_images, "images");
-  ParallelFor(num_images, num_threads, [&](int64_t i) {
+  progress.Begin("rank overlaps", std::ssize(idxs), "images");
+  ParallelFor(std::ssize(idxs), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
-    const int idx = static_cast<int>(i);
+    const int idx = idxs[i];
     OverlapCounter counter(options);
     std::vector<OverlapPartner> partners;
     const auto look_at = [&](int other) {

@@ -43,10 +43,11 @@ struct OverlapPartner {
 // first, ties to the smaller index.
 using TakeRanking = std::function<void(int idx, const std::vector<OverlapPartner>& partners)>;
 
-// Ranks the partners of every image and hands them to `take`, on any thread, each once.  Only images within
-// reach of each other are looked at, each pair of these twice.  Memory: 150 bytes per image, 5 kB per camera.
-// Errors: Cancelled.
-Status RankOverlaps(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,
-                    int num_threads, Progress& progress, const TakeRanking& take);
+// Ranks the partners of the images `idxs` and hands them to `take`, on any thread, each once.  Only images
+// within reach of each other are looked at, each pair of these twice.  Memory: 150 bytes per image, 5 kB per
+// camera. Errors: Cancelled.
+Status RankOverlaps(const std::vector<PosedCamera>& images, const std::vector<int>& idxs,
+                    const FrustumOverlapOptions& options, int num_threads, Progress& progress,
+                    const TakeRanking& take);
 
 }  // namespace cairn::match_features

@@ -12,7 +12,7 @@
 #include "core/colmap/colmap_database.h"
 #include "core/features/features.h"
 #include "core/geometry/pose.h"
-#include "stages/match_features/guided_match.h"
+#include "stages/match_features/two_views/guided_match.h"
 
 namespace cairn::match_features {
 

@@ -11,7 +11,7 @@
 #include "core/options/options.h"
 #include "stages/match_features/pairs/image_features.h"
 #include "stages/match_features/pairs/select_pairs.h"
-#include "stages/match_features/verify_pair.h"
+#include "stages/match_features/two_views/verify_pair.h"
 
 namespace cairn::match_features {
 

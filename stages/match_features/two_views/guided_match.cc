@@ -1,4 +1,4 @@
-#include "stages/match_features/guided_match.h"
+#include "stages/match_features/two_views/guided_match.h"
 
 #include <algorithm>
 #include <cmath>
