@@ -17,9 +17,9 @@
 
 #include "core/base/quantiles.h"
 #include "core/capture/capture.h"
-#include "core/capture/image_file.h"
 #include "core/colmap/image_list.h"
 #include "core/features/sift.h"
+#include "core/images/image_file.h"
 #include "runtime/atlas/atlas_localizer.h"
 #include "runtime/atlas/code_index.h"
 #include "runtime/localize/localizer.h"

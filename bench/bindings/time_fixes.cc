@@ -7,7 +7,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "runtime/localize/localizer.h"
 
 int main(int argc, char** argv) {

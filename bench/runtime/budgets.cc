@@ -15,7 +15,7 @@
 
 #include "bench/runtime/fix_figures.h"
 #include "core/capture/capture.h"
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "runtime/track/region_tracker.h"
 
 namespace cairn {

@@ -13,8 +13,8 @@
 #include "bench/runtime/fix_figures.h"
 #include "core/base/random.h"
 #include "core/capture/capture.h"
-#include "core/capture/image_file.h"
 #include "core/colmap/rig_config.h"
+#include "core/images/image_file.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 

@@ -10,13 +10,13 @@
 #include "core/base/printable.h"
 #include "core/base/text.h"
 #include "core/capture/exif.h"
-#include "core/capture/image_file.h"
 #include "core/capture/sessions.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_model.h"
 #include "core/colmap/cut_database.h"
 #include "core/colmap/image_list.h"
 #include "core/files/file.h"
+#include "core/images/image_file.h"
 
 namespace cairn {
 namespace {

@@ -8,9 +8,9 @@
 #include "core/base/text.h"
 #include "core/capture/bag_file.h"
 #include "core/capture/frame_choice.h"
-#include "core/capture/image_file.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_model.h"
+#include "core/images/image_file.h"
 #include "pipeline/build/make_words.h"
 
 namespace cairn::pipeline {

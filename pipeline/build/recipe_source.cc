@@ -4,9 +4,9 @@
 
 #include "core/capture/capture_features.h"
 #include "core/capture/film_file.h"
-#include "core/capture/image_file.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
+#include "core/images/image_file.h"
 #include "core/map/map_head_tables.h"
 #include "pipeline/build/footage.h"
 #include "pipeline/build/make_words.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/line/child_environment.h"
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 
 namespace cairn::pipeline {
 

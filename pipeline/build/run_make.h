@@ -10,7 +10,7 @@
 
 namespace cairn::pipeline {
 
-// map.mk of the program's installation (core/line/program_files.h).  Errors: NotFound.
+// map.mk of the program's installation (core/modules/program_files.h).  Errors: NotFound.
 Result<std::string> RulesPath(const std::string& program);
 
 // A command line of make that makes `goal` by these rules in this build folder.  `progress_style`: of the

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/file.h"
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 #include "pipeline/build/build_files.h"
 #include "pipeline/build/build_folder.h"
 #include "pipeline/build/build_report.h"

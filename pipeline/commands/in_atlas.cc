@@ -13,7 +13,7 @@
 
 #include "core/atlas/atlas_file.h"
 #include "core/base/parallel.h"
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "pipeline/commands/localization_json.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/atlas/atlas.h"

@@ -17,7 +17,7 @@
 #include "core/base/text.h"
 #include "core/blocks/map_rows.h"
 #include "core/files/file.h"
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 #include "pipeline/build/build_step.h"
 #include "pipeline/build/folder_lock.h"
 #include "pipeline/build/recipe.h"

@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "core/base/text.h"
-#include "core/capture/image_file.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
+#include "core/images/image_file.h"
 
 namespace cairn::pipeline {
 

@@ -9,7 +9,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/blocks/map_rows.h"
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "pipeline/commands/odometry.h"
 #include "pipeline/commands/query_images.h"
 #include "pipeline/program/json_text.h"

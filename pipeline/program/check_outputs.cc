@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "core/capture/capture_frame.h"
-#include "core/capture/image_file.h"
 #include "core/files/output_path.h"
+#include "core/images/image_file.h"
 
 namespace cairn::pipeline {
 namespace {

@@ -1,7 +1,7 @@
 // Where is this picture?  localize MAP IMAGE
 #include <cstdio>
 
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "runtime/localize/localizer.h"
 
 int main(int argc, char** argv) {

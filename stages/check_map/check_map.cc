@@ -10,8 +10,8 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
-#include "core/capture/image_file.h"
 #include "core/features/sift.h"
+#include "core/images/image_file.h"
 #include "runtime/localize/refine.h"
 #include "stages/check_map/truth_fit.h"
 

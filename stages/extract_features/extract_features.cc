@@ -10,6 +10,7 @@
 #include "core/colmap/colmap_database.h"
 #include "core/features/descriptor_kind_table.h"
 #include "core/features/features.h"
+#include "core/images/image_file.h"
 #include "core/learned/feature_finder.h"
 #include "stages/extract_features/extract_image.h"
 #include "stages/extract_features/resources.h"
@@ -103,6 +104,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
     for (size_t i = 0; i < batch.size(); ++i) {
       const CaptureImage& image = run->images[begin + i];
       if (batch[i].reject_reason) {
+        CAIRN_RETURN_IF_ERROR(CheckImageCodecs(image.name));  // not the image's fault
         summary.rejects.push_back({image.name, *batch[i].reject_reason});
         continue;
       }

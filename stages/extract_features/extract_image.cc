@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "core/capture/image_file.h"
 #include "core/colmap/colmap_database.h"
 #include "core/features/descriptor_kind_table.h"
 #include "core/features/hash_features.h"
 #include "core/files/file.h"
+#include "core/images/image_file.h"
 
 namespace cairn::extract_features {
 namespace {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -18,6 +17,7 @@
 #include "core/files/file.h"
 #include "core/files/folder.h"
 #include "core/files/write_error.h"
+#include "core/images/image_file.h"
 #include "sim/render/building.h"
 #include "sim/render/floor_plan.h"
 #include "sim/survey/survey.h"
@@ -28,12 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 Status WriteJpeg(const std::string& path, const cv::Mat& grey, int quality) {
-  std::vector<uchar> bytes;
-  if (!cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, quality})) {
-    return MakeError(ErrorCode::kFailed, "{}: cannot be encoded as JPEG", path);
-  }
+  CAIRN_ASSIGN_OR_RETURN(const std::string bytes, EncodeJpeg(grey, quality, path));
   std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();
   if (!file) return WriteError(path, "cannot be written", errno);
   return Ok();

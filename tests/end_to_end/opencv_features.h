@@ -10,7 +10,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "core/capture/capture.h"
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 
 namespace cairn {
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/capture/capture.h"
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 #include "runtime/c_api/cairn.h"
 #include "tests/end_to_end/program_run.h"
 

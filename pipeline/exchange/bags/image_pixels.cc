@@ -3,10 +3,9 @@
 #include <map>
 #include <optional>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -136,13 +135,7 @@ Result<BagPicture> PictureOf(const CompressedImageMessage& image) {
 
 Result<std::string> FileOf(const BagPicture& picture) {
   if (!picture.encoded.empty()) return picture.encoded;
-  std::vector<uint8_t> bytes;
-  try {
-    if (cv::imencode(".png", picture.pixels, bytes)) return std::string(bytes.begin(), bytes.end());
-    return MakeError(ErrorCode::kIo, "OpenCV cannot write it as PNG");
-  } catch (const cv::Exception& exception) {
-    return MakeError(ErrorCode::kIo, "OpenCV cannot write it as PNG: {}", exception.err);
-  }
+  return EncodePng(picture.pixels, "the image");
 }
 
 }  // namespace cairn::pipeline

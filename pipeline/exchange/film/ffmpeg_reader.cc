@@ -333,7 +333,7 @@ double FfmpegReader::StatedDurationS() const {
 extern "C" {
 // The name is kFilmModuleName.
 extern const FilmModule cairn_film_module;
-const FilmModule cairn_film_module = {.version = CAIRN_FILM_VERSION, .open = &FfmpegReader::Open};
+const FilmModule cairn_film_module = {.version = CAIRN_MODULE_VERSION, .open = &FfmpegReader::Open};
 }
 
 }  // namespace cairn::pipeline

@@ -4,7 +4,7 @@
 
 #include "core/capture/film_file.h"
 #include "core/files/input_file.h"
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 #include "pipeline/exchange/film/film_module.h"
 
 namespace cairn::pipeline {

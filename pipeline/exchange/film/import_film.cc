@@ -9,13 +9,12 @@
 #include <optional>
 #include <utility>
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "core/base/parallel.h"
 #include "core/camera/camera.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
 #include "core/files/folder.h"
+#include "core/images/image_file.h"
 #include "pipeline/exchange/film/film_reader.h"
 
 namespace cairn::pipeline {
@@ -180,10 +179,8 @@ class FilmImporter {
     name_ms_ = std::max(name_ms_ + 1, static_cast<int64_t>(std::llround(frame.time_s * 1000)));
     const std::string path =
         fmt::format("{}/images/{:06}.{:03}.jpg", folder_, name_ms_ / 1000, name_ms_ % 1000);
-    std::vector<uchar> bytes;
-    if (!cv::imencode(".jpg", frame.grey, bytes, {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality}))
-      return MakeError(ErrorCode::kFailed, "{}: cannot be encoded as JPEG", path);
-    return WriteFileAtomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, EncodeJpeg(frame.grey, options_.jpeg_quality, path));
+    return WriteFileAtomically(path, bytes);
   }
 
   Status CheckResult(const FilmReader& reader) const {

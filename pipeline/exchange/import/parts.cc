@@ -2,9 +2,9 @@
 
 #include "core/base/pooled.h"
 #include "core/base/text.h"
-#include "core/capture/image_file.h"
 #include "core/colmap/colmap_model.h"
 #include "core/geometry/rotations.h"
+#include "core/images/image_file.h"
 
 namespace cairn::pipeline {
 

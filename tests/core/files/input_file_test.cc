@@ -13,9 +13,9 @@
 
 #include "core/capture/capture.h"
 #include "core/capture/exif.h"
-#include "core/capture/image_file.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
+#include "core/images/image_file.h"
 #include "core/options/toml_options.h"
 #include "core/plan/views_database.h"
 #include "core/world/world.h"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/files/file.h"
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 
 namespace cairn::pipeline {
 namespace {

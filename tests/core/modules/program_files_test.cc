@@ -1,4 +1,4 @@
-#include "core/line/program_files.h"
+#include "core/modules/program_files.h"
 
 #include <unistd.h>
 

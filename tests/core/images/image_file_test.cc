@@ -1,4 +1,4 @@
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 
 #include <unistd.h>
 

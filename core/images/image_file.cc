@@ -1,4 +1,4 @@
-#include "core/capture/image_file.h"
+#include "core/images/image_file.h"
 
 #include <algorithm>
 #include <cctype>
@@ -6,9 +6,11 @@
 #include <limits>
 #include <set>
 
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "core/files/file.h"
+#include "core/images/image_module.h"
+#include "core/modules/module.h"
 
 namespace cairn {
 namespace {
@@ -80,6 +82,33 @@ std::string FindDefect(std::string_view bytes) {
   return "";
 }
 
+// `path`: what it is for.
+Result<const ImageModule*> ModuleFor(const std::string& path) {
+  static const Result<const void*> module = LoadModuleOfProgram("images", {.symbol = kImageModuleName,
+                                                                           .version = CAIRN_MODULE_VERSION,
+                                                                           .needs = "OpenCV's codecs",
+                                                                           .packages = CAIRN_CODECS_PACKAGE});
+  if (!module.ok()) {
+    return MakeError(module.error().code, "{}: image files cannot be read and written here: {}", path,
+                     module.error().message);
+  }
+  return static_cast<const ImageModule*>(*module);
+}
+
+// `kind`: for messages.
+Result<std::string> Encode(const std::string& suffix, const std::string& kind, const cv::Mat& image,
+                           int quality, const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const ImageModule* const module, ModuleFor(path));
+  std::vector<uint8_t> bytes;
+  try {
+    if (module->encode(suffix, image, quality, &bytes)) return std::string(bytes.begin(), bytes.end());
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    return MakeError(ErrorCode::kFailed, "{}: cannot be encoded as {}: {}", path, kind, exception.err);
+  }
+  return MakeError(ErrorCode::kFailed, "{}: cannot be encoded as {}", path, kind);
+}
+
 }  // namespace
 
 bool HasImageSuffix(const std::string& path) {
@@ -95,9 +124,10 @@ Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path)
   if (const std::string defect = FindDefect(bytes); !defect.empty()) {
     return MakeError(ErrorCode::kCorrupt, "{}: {}", path, defect);
   }
+  CAIRN_ASSIGN_OR_RETURN(const ImageModule* const module, ModuleFor(path));
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-    cv::Mat grey = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    cv::Mat grey = module->decode_grey(buffer);
     if (!grey.empty()) return grey;
   } catch (const cv::Exception& exception) {
     if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault
@@ -109,9 +139,22 @@ Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path)
                    path, bytes.size());
 }
 
+Result<std::string> EncodeJpeg(const cv::Mat& image, int quality, const std::string& path) {
+  return Encode(".jpg", "JPEG", image, quality, path);
+}
+
+Result<std::string> EncodePng(const cv::Mat& image, const std::string& path) {
+  return Encode(".png", "PNG", image, 0, path);
+}
+
 Result<cv::Mat> ReadGreyImage(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   return DecodeGreyImage(bytes, path);
+}
+
+Status CheckImageCodecs(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN([[maybe_unused]] const ImageModule* const module, ModuleFor(path));
+  return Ok();
 }
 
 const std::string* ImageCopies::FindOrAdd(const std::string& path) {

@@ -1,0 +1,54 @@
+#include "core/modules/module.h"
+
+#include <dlfcn.h>
+
+#include <string_view>
+
+#include "core/modules/program_files.h"
+
+namespace cairn {
+namespace {
+
+// By the words of the C library's loader, which are English here: the program sets no locale.
+bool IsOfMissingLibrary(const std::string& text, const std::string& module) {
+  return text.find("cannot open shared object file") != std::string::npos && !text.starts_with(module);
+}
+
+}  // namespace
+
+Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted) {
+  // Never closed: what it made, and what its libraries registered, live on.
+  void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) {
+    const std::string text = dlerror();
+    if (IsOfMissingLibrary(text, path)) {
+      return MakeError(ErrorCode::kNotFound, "{}: needs {} ({}); install them (Debian: apt install {})", path,
+                       wanted.needs, text, wanted.packages);
+    }
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: cannot be loaded ({}); install the program again, or allow it more memory where "
+                     "that is limited (ulimit -v, -d)",
+                     path, text);
+  }
+  const void* const module = dlsym(library, wanted.symbol);
+  if (module == nullptr) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: is no module of cairn ({} is not in it); install the program again", path,
+                     wanted.symbol);
+  }
+  const char* const version = *static_cast<const char* const*>(module);
+  if (std::string_view(version) != wanted.version) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: is of cairn {}, but the program is {}; install both of one build", path, version,
+                     wanted.version);
+  }
+  return module;
+}
+
+Result<const void*> LoadModuleOfProgram(const std::string& name, const ModuleWanted& wanted) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
+  CAIRN_ASSIGN_OR_RETURN(const std::string path, InstalledPath(program, "lib/cairn/" + name + ".so"));
+  return LoadModule(path, wanted);
+}
+
+}  // namespace cairn
