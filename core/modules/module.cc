@@ -1,7 +1,9 @@
 #include "core/modules/module.h"
 
 #include <dlfcn.h>
+#include <sys/resource.h>
 
+#include <new>
 #include <string_view>
 
 #include "core/modules/program_files.h"
@@ -14,6 +16,18 @@ bool IsOfMissingLibrary(const std::string& text, const std::string& module) {
   return text.find("cannot open shared object file") != std::string::npos && !text.starts_with(module);
 }
 
+bool IsMemoryLimited() {
+  rlimit data = {}, all = {};
+  return (getrlimit(RLIMIT_DATA, &data) == 0 && data.rlim_cur != RLIM_INFINITY) ||
+         (getrlimit(RLIMIT_AS, &all) == 0 && all.rlim_cur != RLIM_INFINITY);
+}
+
+// A segment that cannot be mapped may also be one that the file system does not let run.
+bool IsOfMemory(const std::string& text) {
+  return text.find("annot allocate memory") != std::string::npos ||
+         (text.find("failed to map segment") != std::string::npos && IsMemoryLimited());
+}
+
 }  // namespace
 
 Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted) {
@@ -21,14 +35,13 @@ Result<const void*> LoadModule(const std::string& path, const ModuleWanted& want
   void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
     const std::string text = dlerror();
+    if (IsOfMemory(text)) throw std::bad_alloc();
     if (IsOfMissingLibrary(text, path)) {
       return MakeError(ErrorCode::kNotFound, "{}: needs {} ({}); install them (Debian: apt install {})", path,
                        wanted.needs, text, wanted.packages);
     }
-    return MakeError(ErrorCode::kUnsupported,
-                     "{}: cannot be loaded ({}); install the program again, or allow it more memory where "
-                     "that is limited (ulimit -v, -d)",
-                     path, text);
+    return MakeError(ErrorCode::kUnsupported, "{}: cannot be loaded ({}); install the program again", path,
+                     text);
   }
   const void* const module = dlsym(library, wanted.symbol);
   if (module == nullptr) {

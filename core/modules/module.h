@@ -19,7 +19,7 @@ struct ModuleWanted {
 
 // Loads a module and its libraries, for as long as the program runs; again: the same.  Returns its struct.
 // REQUIRES: `path` is absolute, and so looked for nowhere else.  Errors: NotFound (libraries that it needs),
-// Unsupported (no module, or one of another build).
+// Unsupported (no module, or one of another build).  Throws std::bad_alloc where memory is too short for it.
 Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted);
 
 // The same, of lib/cairn/NAME.so of this program.  Errors: also NotFound (no such file), Failed.
