@@ -23,7 +23,7 @@ PACKAGES_MORE := colmap $(PACKAGES_PYTHON) \
     libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev libnav-msgs-dev
 # Tests and benchmarks: films, a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
 PACKAGES_TEST := $(PACKAGES_MORE) $(LIBRARIES_TEST) sqlite3 ffmpeg \
-    slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
+    python3-fusepy slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
     python3-rosbag python3-nav-msgs python3-tf2-msgs \
     debhelper dh-python lintian debootstrap gnupg clang libclang-rt-14-dev clang-format clang-tidy

@@ -9,6 +9,7 @@
 #include <SQLiteCpp/Backup.h>
 
 #include "core/colmap/colmap_database.h"
+#include "core/files/file_lock.h"
 
 namespace cairn {
 namespace {
@@ -93,7 +94,7 @@ SQLite::Database OpenCopy(const std::string& path) {
   const std::string copy = (folder / fs::path(path).filename()).string();
   fs::copy_file(path, copy, fs::copy_options::overwrite_existing);
   fs::copy_file(path + "-wal", copy + "-wal", fs::copy_options::overwrite_existing);
-  SQLite::Database database(copy, SQLite::OPEN_READWRITE);
+  SQLite::Database database = OpenPrivate(copy);
   Harden(database, NumBytes(copy) + NumBytes(copy + "-wal"));
   ReadSchema(database);
   database.exec("PRAGMA wal_checkpoint(TRUNCATE)");
@@ -111,6 +112,8 @@ SQLite::Database OpenUnchanged(const std::string& path) {
     std::error_code error;
     if (!fs::exists(path + "-shm", error)) return OpenCopy(path);
   }
+  // Nobody who writes to it could say so.
+  if (!HasRecordLocks(path) && !IsFilled(path + "-journal") && !IsInWalMode(path)) return OpenImmutable(path);
   SQLite::Database database(DatabaseUri(path) + "?mode=ro", SQLite::OPEN_READONLY | SQLite::OPEN_URI,
                             kBusyTimeoutMs);
   Harden(database, NumBytes(path) + NumBytes(path + "-wal"));
@@ -150,7 +153,7 @@ Result<SQLite::Database> OpenColmapDatabase(const std::string& path) {
 }
 
 void CopyColmapDatabase(SQLite::Database& source, const std::string& copy_path) {
-  SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  SQLite::Database copy = OpenPrivate(copy_path);
   SQLite::Backup(copy, source).executeStep(-1);
   Harden(copy, NumBytes(copy_path));
   copy.exec("PRAGMA journal_mode = DELETE");  // a copy of a database in WAL mode is in WAL mode

@@ -59,7 +59,7 @@ SqliteHeader ReadSqliteHeader(const std::string& path) {
 }
 
 std::string DatabaseUri(const std::string& path) {
-  std::string uri = "file:";
+  std::string uri = path.starts_with("//") ? "file://" : "file:";  // what follows two slashes is a host
   for (const unsigned char c : path) {  // percent-encodes characters with a meaning in a URI's path
     if (c == '%' || c == '?' || c == '#') {
       uri += fmt::format("%{:02x}", c);
@@ -108,6 +108,14 @@ SQLite::Database OpenImmutable(const std::string& path) {
   return database;
 }
 
+SQLite::Database OpenPrivate(const std::string& path) {
+  // "nolock" would refuse what is in WAL mode, as a copy may be.
+  SQLite::Database database(DatabaseUri(path) + "?vfs=unix-none",
+                            SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI);
+  database.exec("PRAGMA locking_mode = EXCLUSIVE");
+  return database;
+}
+
 bool IsSqliteFile(const std::string& path) {
   char head[sizeof(kMagic)] = {};
   if (!CheckInputFile(path).ok()) return false;
@@ -148,7 +156,7 @@ Status WriteDatabase(const std::string& path, const std::string& schema,
                      const std::function<Status(SQLite::Database&)>& fill) {
   return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
     return WithDatabaseErrors(path, [&]() -> Status {
-      SQLite::Database database(temporary, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+      SQLite::Database database = OpenPrivate(temporary);
       database.exec("PRAGMA page_size = 4096; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;");
       database.exec("BEGIN");
       database.exec(schema);

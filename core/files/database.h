@@ -87,6 +87,11 @@ void ReadSchema(SQLite::Database& database);
 // writes meanwhile.  Throws SQLite::Exception: call it inside WithDatabaseErrors.
 SQLite::Database OpenImmutable(const std::string& path);
 
+// Opens a file that this process alone knows of, such as one that is renamed when it is whole, to be written;
+// makes it if it is not there.  It is not locked: a file system may have no locks, or slow ones.  Throws
+// SQLite::Exception.
+SQLite::Database OpenPrivate(const std::string& path);
+
 // Errors: NotFound, Corrupt (empty, not a regular file, without SQLite's magic bytes, or not whole pages).
 Status CheckSqliteFile(const std::string& path);
 

@@ -1,12 +1,25 @@
 #include "core/files/file_lock.h"
 
+#include <fcntl.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <utility>
 
+#include "core/files/file_descriptor.h"
+
 namespace cairn {
+
+bool HasRecordLocks(const std::string& path) {
+  const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  struct flock lock = {};
+  lock.l_type = F_RDLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_len = 1;
+  return file.get() < 0 || fcntl(file.get(), F_GETLK, &lock) == 0 ||
+         (errno != ENOLCK && errno != ENOSYS && errno != ENOTSUP);
+}
 
 FileLock::FileLock(FileLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
 

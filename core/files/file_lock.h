@@ -1,6 +1,12 @@
 #pragma once
 
+#include <string>
+
 namespace cairn {
+
+// Whether the file system of a file that can be read has locks of parts of files (fcntl), as SQLite wants
+// them: some network file systems have none.
+bool HasRecordLocks(const std::string& path);
 
 // A lock between processes, held as long as the object lives: an flock on an open file or folder.  Child
 // processes that inherit the descriptor hold the lock too.

@@ -71,7 +71,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
   return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
     Hash root = {};
     CAIRN_RETURN_IF_ERROR(WithDatabaseErrors(path, [&]() -> Status {
-      SQLite::Database database(temporary, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+      SQLite::Database database = OpenPrivate(temporary);
       database.exec(fmt::format("PRAGMA page_size = {}; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;",
                                 page_size));
       database.exec("BEGIN");

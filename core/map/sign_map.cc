@@ -26,7 +26,7 @@ Result<Hash> SetEpoch(const std::string& path, uint64_t epoch) {
   return WithDatabaseErrors(path, [&]() -> Result<Hash> {
     std::error_code error;
     const auto num_bytes = static_cast<int64_t>(std::filesystem::file_size(path, error));
-    SQLite::Database database(path, SQLite::OPEN_READWRITE);
+    SQLite::Database database = OpenPrivate(path);
     Harden(database, num_bytes);
     database.exec("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF;");
     const StepLimit steps(database, MaxStepsFor(num_bytes));
