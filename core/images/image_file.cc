@@ -1,5 +1,7 @@
 #include "core/images/image_file.h"
 
+#include <link.h>
+
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -10,6 +12,7 @@
 
 #include "core/files/file.h"
 #include "core/images/image_module.h"
+#include "core/modules/build_id.h"
 #include "core/modules/module.h"
 
 namespace cairn {
@@ -95,6 +98,15 @@ Result<const ImageModule*> ModuleFor(const std::string& path) {
   return static_cast<const ImageModule*>(*module);
 }
 
+// Adds the ids of the libraries that decide what a decoded image is.
+int AddDecoder(dl_phdr_info* library, size_t, void* ids) {
+  const std::string name = std::filesystem::path(library->dlpi_name).filename().string();
+  for (const char* decoder : {"libopencv_imgcodecs.", "libjpeg.", "libpng", "libtiff.", "libwebp."}) {
+    if (name.starts_with(decoder)) static_cast<std::set<std::string>*>(ids)->insert(IdOfLibrary(*library));
+  }
+  return 0;
+}
+
 // `kind`: for messages.
 Result<std::string> Encode(const std::string& suffix, const std::string& kind, const cv::Mat& image,
                            int quality, const std::string& path) {
@@ -155,6 +167,18 @@ Result<cv::Mat> ReadGreyImage(const std::string& path) {
 Status CheckImageCodecs(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN([[maybe_unused]] const ImageModule* const module, ModuleFor(path));
   return Ok();
+}
+
+Result<std::string> ImageCodecsIdentity(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckImageCodecs(path));
+  static const std::string identity = [] {
+    std::set<std::string> ids;
+    dl_iterate_phdr(AddDecoder, &ids);
+    std::string all;
+    for (const std::string& id : ids) all += id;
+    return HashBytes(all);
+  }();
+  return identity;
 }
 
 const std::string* ImageCopies::FindOrAdd(const std::string& path) {

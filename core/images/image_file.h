@@ -36,6 +36,10 @@ Result<std::string> EncodePng(const cv::Mat& image, const std::string& path);
 // Unsupported.
 Status CheckImageCodecs(const std::string& path);
 
+// A hash of what decodes image files here: OpenCV's codecs and the libraries of the formats.  Errors: as
+// CheckImageCodecs.
+Result<std::string> ImageCodecsIdentity(const std::string& path);
+
 // Image files by their bytes, to find one that is another's copy under another name.  Only files of one size
 // are read.
 class ImageCopies {

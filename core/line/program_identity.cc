@@ -1,6 +1,5 @@
 #include "core/line/program_identity.h"
 
-#include <elf.h>
 #include <link.h>
 
 #include <algorithm>
@@ -11,28 +10,10 @@
 
 #include "core/features/packed_descriptors.h"
 #include "core/files/file.h"
+#include "core/modules/build_id.h"
 
 namespace cairn {
 namespace {
-
-// The linker's hash of an object's contents; empty when it has none.
-std::string BuildId(const dl_phdr_info& object) {
-  constexpr auto align = [](size_t size) { return (size + 3) & ~size_t{3}; };
-  for (int i = 0; i < object.dlpi_phnum; ++i) {
-    const ElfW(Phdr)& header = object.dlpi_phdr[i];
-    if (header.p_type != PT_NOTE) continue;
-    const char* const notes = reinterpret_cast<const char*>(object.dlpi_addr + header.p_vaddr);
-    for (size_t offset = 0; offset + sizeof(ElfW(Nhdr)) <= header.p_memsz;) {
-      const auto& note = *reinterpret_cast<const ElfW(Nhdr)*>(notes + offset);
-      const size_t contents = offset + sizeof(note) + align(note.n_namesz);
-      const size_t end = contents + align(note.n_descsz);
-      if (end > header.p_memsz) break;
-      if (note.n_type == NT_GNU_BUILD_ID) return {notes + contents, note.n_descsz};
-      offset = end;
-    }
-  }
-  return "";
-}
 
 int CountObject(dl_phdr_info*, size_t, void* count) {
   ++*static_cast<int*>(count);
@@ -57,12 +38,7 @@ int AddLibrary(dl_phdr_info* object, size_t, void* context) {
   if (++libraries.num_objects > num_linked_objects) return 1;
   const std::string_view name = object->dlpi_name;
   if (!name.starts_with('/')) return 0;  // the executable, and the kernel's own
-  std::string id = BuildId(*object);
-  if (id.empty()) {
-    const auto hash = HashFile(object->dlpi_name);
-    id = hash.ok() ? *hash : std::string(name);
-  }
-  libraries.ids.push_back(std::move(id));
+  libraries.ids.push_back(IdOfLibrary(*object));
   return 0;
 }
 

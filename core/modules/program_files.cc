@@ -1,5 +1,7 @@
 #include "core/modules/program_files.h"
 
+#include <sys/auxv.h>
+
 #include <filesystem>
 
 namespace cairn {
@@ -9,8 +11,15 @@ namespace fs = std::filesystem;
 Result<std::string> ProgramPath() {
   std::error_code error;
   const fs::path path = fs::read_symlink("/proc/self/exe", error);
-  if (error) return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
-  return path.string();
+  if (!error) return path.string();
+  // Without /proc, as in a bare chroot: by the path that the kernel was given, where that is a whole one.
+  const auto* const started_by = reinterpret_cast<const char*>(getauxval(AT_EXECFN));
+  std::error_code other_error;
+  if (started_by != nullptr && fs::path(started_by).is_absolute()) {
+    const fs::path file = fs::canonical(started_by, other_error);
+    if (!other_error) return file.string();
+  }
+  return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
 }
 
 Result<std::string> InstalledPath(const std::string& program, const std::string& name) {

@@ -15,9 +15,9 @@ namespace fs = std::filesystem;
 
 // Of a camera only its size and its kind matter (a panorama's has no parameters).
 ContentHash KeyOf(const Camera& camera, ContentHash image, const std::optional<ContentHash>& mask,
-                  ExtractFeaturesOptions options, const FeatureFinder& finder) {
+                  const std::string& codecs, ExtractFeaturesOptions options, const FeatureFinder& finder) {
   ContentHasher key;
-  key.Text("features").Hash(image).UInt(mask ? 1 : 0).Hash(mask.value_or(ContentHash()));
+  key.Text("features").Text(codecs).Hash(image).UInt(mask ? 1 : 0).Hash(mask.value_or(ContentHash()));
   key.UInt(camera.width)
       .UInt(camera.height)
       .UInt(camera.model == CameraModel::kEquirectangular ? 1 : 0)
@@ -162,7 +162,8 @@ Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& imag
     mask_hash = HashContents(mask_bytes);
   }
   const Camera& camera = capture.cameras.at(image.camera_id);
-  extraction.key = KeyOf(camera, HashContents(bytes), mask_hash, options, finder);
+  CAIRN_ASSIGN_OR_RETURN(const std::string codecs, ImageCodecsIdentity(path));
+  extraction.key = KeyOf(camera, HashContents(bytes), mask_hash, codecs, options, finder);
   const std::vector<std::string> names = ViewNames(image, camera, options.panorama);
   if (FindViews(extraction.key, names, &earlier->to_leave)) {
     extraction.is_elsewhere = true;
