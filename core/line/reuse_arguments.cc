@@ -20,16 +20,19 @@ Argument ReuseArguments::Add(ArgumentParser& parser, const std::string& results)
       .Type("I/N");
 }
 
-Result<ReuseOptions> ReuseArguments::Apply(const std::string& output_path) const {
+Result<ReuseOptions> ReuseArguments::Apply(const std::string& output_path, bool writes_part) const {
   ReuseOptions options{.previous = !no_reuse_, .files = files_};
-  if (shard_.empty()) return options;
-  CAIRN_ASSIGN_OR_RETURN(options.shard, ParseShard(shard_));
+  if (shard_.empty() && !writes_part) return options;
+  if (!shard_.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(options.shard, ParseShard(shard_));
+  }
   for (const std::string& file : files_) {
     if (!IsSameFile(file, output_path)) continue;
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--reuse {} is also the output: a shard holds only its own share, so the rest of the "
-                     "file would be lost; choose another -o",
-                     file);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--reuse {} is also the output: a shard holds only its own share, and a plan no results, so "
+        "the rest of the file would be lost; choose another -o",
+        file);
   }
   return options;
 }

@@ -15,7 +15,8 @@ class ReuseArguments {
   // `results`: what the stage takes over, for --help ("images", "pairs").  Returns --shard.
   Argument Add(ArgumentParser& parser, const std::string& results);
   // Errors: InvalidArgument (an invalid shard, or one that would replace a file that it reads).
-  Result<ReuseOptions> Apply(const std::string& output_path) const;
+  // `writes_part`: the output is not whole without a shard, either.
+  Result<ReuseOptions> Apply(const std::string& output_path, bool writes_part = false) const;
 
  private:
   std::vector<std::string> files_;

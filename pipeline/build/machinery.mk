@@ -151,34 +151,39 @@ CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if
 # what is missing and removes them, with those of an earlier SHARDS.  They are SECONDARY: a missing shard makes nothing out
 # of date.
 CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
+# $(call CAIRN_PLAN,X,ROUND): of these numbers alone.
+CAIRN_PLAN = $(BUILD)/$(1)-$(2)-plan-$(SHARDS)-$(SHARD_IMAGES)
 # $(call CAIRN_SHARD_STAMPS,X,ROUNDS): those of plans, too.
 CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp) \
-    $(BUILD)/$(1)-$(round)-plan.stamp)
+    $(call CAIRN_PLAN,$(1),$(round)).stamp)
 # What a round begins with.  $(call CAIRN_AFTER_ROUND,X,ROUND): no round is the inputs.
 CAIRN_AFTER_ROUND = $(if $(2),$(call CAIRN_SHARD_STAMPS,$(1),$(2)),$(BUILD)/$(1).begun)
-# $(call CAIRN_SHARD_RULE,X,ROUND,I,COMMAND,EARLIER ROUNDS): COMMAND is the name of a variable
+# $(call CAIRN_SHARD_RULE,X,ROUND,I,COMMAND,EARLIER ROUNDS): COMMAND is the name of a variable.  Here and where else a shell
+# has more to do than to run a stage, "exec" puts the stage in the shell's place: who stops make stops the stage.
 define CAIRN_SHARD_RULE
 .SECONDARY: $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp
-$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(5))
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: SHARD_ROUNDS_BEFORE := $(5)
 $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: PROGRESS := $(if $(filter json,$(PROGRESS)),json,none)
-$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(BUILD)/$(1)-$(2)-plan.stamp
-	read -r n last < $$(@D)/$(1)-$(2)-plan.db.shards; if [ $(3) -gt $$$$n ]; then touch $$@; else \
-	    $$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$$$$n $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
-	    $$(CAIRN_REUSE_SHARDS) $$(if $$(filter matches,$(1)),--planned $$(@D)/$(1)-$(2)-plan.db) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS); fi
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(call CAIRN_PLAN,$(1),$(2)).stamp
+	read -r n last < $(call CAIRN_PLAN,$(1),$(2)).db.shards; if [ $(3) -gt $$$$n ]; then exec touch $$@; fi; \
+	    exec $$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$$$$n $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
+	    $$(call CAIRN_REUSE_SHARDS,$(1)) $$(if $$(filter matches,$(1)),--planned $(call CAIRN_PLAN,$(1),$(2)).db) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
 endef
 # $(call CAIRN_PLAN_RULE,X,ROUND,EARLIER ROUNDS)
 define CAIRN_PLAN_RULE
-.SECONDARY: $(BUILD)/$(1)-$(2)-plan.stamp
-$(BUILD)/$(1)-$(2)-plan.stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(3))
-$(BUILD)/$(1)-$(2)-plan.stamp: BEFORE := $(BUILD)/$(1)-$(lastword 0 $(3))-plan.db.shards
-$(BUILD)/$(1)-$(2)-plan.stamp: $(call CAIRN_AFTER_ROUND,$(1),$(lastword $(3)))
+.SECONDARY: $(call CAIRN_PLAN,$(1),$(2)).stamp
+$(call CAIRN_PLAN,$(1),$(2)).stamp: SHARD_ROUNDS_BEFORE := $(3)
+$(call CAIRN_PLAN,$(1),$(2)).stamp: PLAN_BEFORE := $(call CAIRN_PLAN,$(1),$(lastword 0 $(3))).db.shards
+$(call CAIRN_PLAN,$(1),$(2)).stamp: $(call CAIRN_AFTER_ROUND,$(1),$(lastword $(3)))
 endef
 # Prerequisites of the first round: they remove shards of earlier inputs.
 .SECONDARY: $(BUILD)/features.begun $(BUILD)/matches.begun
 $(BUILD)/features.begun $(BUILD)/matches.begun:
 	rm -f $(@:.begun=)-*of* $(@:.begun=)-*-plan*
 	touch $@
-CAIRN_REUSE_SHARDS = $$(for shard in $(SHARD_STAMPS:.stamp=.db); do [ ! -e $$shard ] || echo --reuse $$shard; done)
+# $(call CAIRN_REUSE_SHARDS,X): what the rounds before left.  The shell lists it: one word for it must not be too long.
+CAIRN_REUSE_SHARDS = $(if $(SHARD_ROUNDS_BEFORE),$$(for shard in $(foreach round,$(SHARD_ROUNDS_BEFORE),$(@D)/$(1)-$(round)-*.db); \
+    do [ ! -e $$shard ] || echo --reuse $$shard; done))
 CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of* $(@:.db.stamp=)-*-plan*
 
 # ---- The capture that map.mk makes: simulated, imported, or joined

@@ -70,16 +70,18 @@ FEATURES_INPUTS := $(call CAIRN_OPTIONS,extract_features) $(BUILD)/options/captu
     $(CAPTURE_IMAGES) $(GIVEN_FEATURES) $(MODEL)
 FEATURES_SHARDS := $(if $(CAIRN_SHARD_NUMBERS),$(call CAIRN_SHARD_STAMPS,features,1))
 $(if $(FEATURES_SHARDS),$(eval $(call CAIRN_PLAN_RULE,features,1,)))
-$(BUILD)/features-1-plan.stamp:
-	n=$$(($$(find -L $(CAPTURE)/ -type f | wc -l) / $(SHARD_IMAGES))); [ $$n -le $(SHARDS) ] || n=$(SHARDS); \
+$(call CAIRN_PLAN,features,1).stamp:
+	images=$(CAPTURE)/images; [ -d $$images ] || images=$(CAPTURE)/; \
+	    n=$$(($$(find -L $$images -type f | wc -l) / $(SHARD_IMAGES))); [ $$n -le $(SHARDS) ] || n=$(SHARDS); \
 	    [ $$n -ge 2 ] || n=0; echo $$n > $(@:.stamp=.db.shards)
 	touch $@
 $(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call CAIRN_SHARD_RULE,features,1,$(shard),CAIRN_EXTRACT,)))
 $(BUILD)/features.begun: $(FEATURES_INPUTS)
 $(BUILD)/features.db.stamp: SHARD_STAMPS := $(FEATURES_SHARDS)
+$(BUILD)/features.db.stamp: SHARD_ROUNDS_BEFORE := $(if $(FEATURES_SHARDS),1)
 $(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_EXTRACT) --depfile $(@D)/images.d $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) $(CAIRN_FLAGS)
+	exec $(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_EXTRACT) --depfile $(@D)/images.d $(call CAIRN_REUSE_SHARDS,features) -o $(@:.stamp=) $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
 # Stage 2: matches of pairs of images; in shards, if there are any.
@@ -99,15 +101,16 @@ $(foreach round,$(MATCHES_ROUNDS),$(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval 
     CAIRN_SHARD_RULE,matches,$(round),$(shard),CAIRN_MATCH,$(wordlist 2,$(round),0 $(MATCHES_ROUNDS))))))
 $(foreach round,$(MATCHES_ROUNDS),$(eval $(call CAIRN_PLAN_RULE,matches,$(round),$(wordlist 2,$(round),0 $(MATCHES_ROUNDS)))))
 # Where too little is left to be divided, the stage itself does the rest.
-$(MATCHES_ROUNDS:%=$(BUILD)/matches-%-plan.stamp):
-	if [ -e $(BEFORE) ] && grep -q last $(BEFORE); then echo 0 last > $(@:.stamp=.db.shards); touch $@; else \
-	    $(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) --plan $(SHARDS) --shard-images $(SHARD_IMAGES) \
-	    $(addprefix --reuse ,$(wildcard $(@D)/matches.db)) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=.db) $(CAIRN_FLAGS); fi
+$(foreach round,$(MATCHES_ROUNDS),$(call CAIRN_PLAN,matches,$(round)).stamp):
+	if grep -qs last $(PLAN_BEFORE); then echo 0 last > $(@:.stamp=.db.shards); exec touch $@; fi; \
+	    exec $(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) --plan $(SHARDS) --shard-images $(SHARD_IMAGES) \
+	    $(addprefix --reuse ,$(wildcard $(@D)/matches.db)) $(call CAIRN_REUSE_SHARDS,matches) -o $(@:.stamp=.db) $(CAIRN_FLAGS)
 $(BUILD)/matches.begun: $(MATCHES_INPUTS)
 $(BUILD)/matches.db.stamp: SHARD_STAMPS := $(MATCHES_SHARDS)
+$(BUILD)/matches.db.stamp: SHARD_ROUNDS_BEFORE := $(MATCHES_ROUNDS)
 $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) $(CAIRN_FLAGS)
+	exec $(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) $(call CAIRN_REUSE_SHARDS,matches) -o $(@:.stamp=) $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
 # Stage 2b: poses, for captures that have none, or none in the frame of others.  The folder's date is that of its last change.  The hash of each image, and so of

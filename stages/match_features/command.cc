@@ -93,7 +93,8 @@ Status CheckWhatChoosesPairs(const Arguments& arguments) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
+  CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse,
+                         arguments.reuse.Apply(arguments.output, arguments.plan.num_shards > 0));
   CAIRN_RETURN_IF_ERROR(CheckWhatChoosesPairs(arguments));
   if (!arguments.inputs.plan_path.empty() && !reuse.shard) {
     return MakeError(ErrorCode::kInvalidArgument,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "stages/match_features/image_step.h"
@@ -110,15 +111,21 @@ ContentHasher HashRanking(const std::vector<PosedCamera>& posed, const FrustumOv
   return hasher;
 }
 
-// A step in which `take` makes an image's numbers of its partners, the largest overlap first.
+// A step in which `take` makes an image's numbers, which are `is_valid`, of its partners, the largest overlap
+// first.
 ImageStep RankingStep(
     const std::string& name, ContentHasher hasher, const std::vector<PosedCamera>& posed, MatchRun* run,
+    const std::function<bool(std::span<const int> numbers, int num_images)>& is_valid,
     const std::function<std::vector<int>(int idx, const std::vector<OverlapPartner>& ranked)>& take) {
   return {
       .name = name,
       .key = [all = hasher.Text(name).Finish()](int idx) -> Result<ContentHash> {
         return ContentHasher().Hash(all).UInt(idx).Finish();
       },
+      .is_valid =
+          [&posed, is_valid](const std::vector<int>& numbers) {
+            return is_valid(numbers, static_cast<int>(posed.size()));
+          },
       .compute = [&posed, run, take](const std::vector<int>& idxs) -> Result<std::vector<std::vector<int>>> {
         std::vector<std::vector<int>> results(posed.size());
         CAIRN_RETURN_IF_ERROR(RankOverlaps(
@@ -134,7 +141,7 @@ ImageStep RankingStep(
 Result<std::optional<IndexPairs>> OverlappingPairs(const std::vector<PosedCamera>& posed,
                                                    SQLite::Database& database, MatchRun* run) {
   const ImageStep step = RankingStep("overlaps", HashRanking(posed, run->options.frustum), posed, run,
-                                     [](int idx, const std::vector<OverlapPartner>& ranked) {
+                                     AreBelow, [](int idx, const std::vector<OverlapPartner>& ranked) {
                                        std::vector<int> later;
                                        for (const OverlapPartner& partner : ranked) {
                                          if (partner.idx > idx) later.push_back(partner.idx);
@@ -145,6 +152,12 @@ Result<std::optional<IndexPairs>> OverlappingPairs(const std::vector<PosedCamera
   return partners ? std::optional(PairsFromPartners(*partners)) : std::nullopt;
 }
 
+// The number of those within an image's generation, they, and those of earlier sessions.
+bool AreSeeds(std::span<const int> numbers, int num_images) {
+  return !numbers.empty() && 0 <= numbers.front() && numbers.front() < std::ssize(numbers) &&
+         AreBelow(numbers.subspan(1), num_images);
+}
+
 // The pairs of largest overlap.
 Result<std::optional<IndexPairs>> SeedPairs(const std::vector<PosedCamera>& posed, SQLite::Database& database,
                                             EarlierPartners* partners, MatchRun* run) {
@@ -152,16 +165,17 @@ Result<std::optional<IndexPairs>> SeedPairs(const std::vector<PosedCamera>& pose
   ContentHasher hasher = HashRanking(posed, options.frustum);
   hasher.UInt(options.num_frustum_seeds).UInt(options.num_frustum_scouts);
   for (const MatchImage& image : run->images.images) hasher.UInt(image.session);
-  // The number of those within the image's generation, they, and those of earlier sessions.
-  const ImageStep step = RankingStep(
-      "seeds", std::move(hasher), posed, run, [&](int idx, const std::vector<OverlapPartner>& ranked) {
-        const EarlierPartners::Seeds seeds =
-            partners->SeedsOf(idx, ranked, options.num_frustum_seeds, options.num_frustum_scouts);
-        std::vector<int> numbers = {static_cast<int>(seeds.within.size())};
-        numbers.insert(numbers.end(), seeds.within.begin(), seeds.within.end());
-        numbers.insert(numbers.end(), seeds.earlier.begin(), seeds.earlier.end());
-        return numbers;
-      });
+
+  const ImageStep step =
+      RankingStep("seeds", std::move(hasher), posed, run, AreSeeds,
+                  [&](int idx, const std::vector<OverlapPartner>& ranked) {
+                    const EarlierPartners::Seeds seeds =
+                        partners->SeedsOf(idx, ranked, options.num_frustum_seeds, options.num_frustum_scouts);
+                    std::vector<int> numbers = {static_cast<int>(seeds.within.size())};
+                    numbers.insert(numbers.end(), seeds.within.begin(), seeds.within.end());
+                    numbers.insert(numbers.end(), seeds.earlier.begin(), seeds.earlier.end());
+                    return numbers;
+                  });
   CAIRN_ASSIGN_OR_RETURN(const auto results, RunImageStep(step, &database, run));
   if (!results) return std::optional<IndexPairs>();
   std::vector<EarlierPartners::Seeds> seeds;

@@ -1,5 +1,6 @@
 #include "stages/match_features/image_step.h"
 
+#include <algorithm>
 #include <numeric>
 #include <string_view>
 #include <utility>
@@ -18,14 +19,16 @@ std::string_view BytesOf(const std::vector<int>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(int)};
 }
 
-std::optional<std::vector<int>> FindNumbers(const ContentHash& key, ReuseSources* sources) {
-  return sources->Find(key, [](const ReuseEntry& entry, ReuseSources::Source& source) {
+std::optional<std::vector<int>> FindNumbers(const ImageStep& step, const ContentHash& key,
+                                            ReuseSources* sources) {
+  return sources->Find(key, [&](const ReuseEntry& entry, ReuseSources::Source& source) {
     std::optional<std::vector<int>> numbers;
     SQLite::Statement query(source.Database(), "SELECT numbers FROM cairn_image_steps WHERE idx = ?");
     query.bind(1, entry.row);
     if (!query.executeStep()) return numbers;
     auto found = BlobToVector<int>(query.getColumn(0), source.path());
-    if (found.ok() && HashContents(BytesOf(*found)) == entry.contents) numbers = std::move(*found);
+    if (found.ok() && HashContents(BytesOf(*found)) == entry.contents && step.is_valid(*found))
+      numbers = std::move(*found);
     return numbers;
   });
 }
@@ -45,7 +48,7 @@ Result<std::vector<int>> FindMissing(const ImageStep& step, const std::vector<in
   std::vector<int> missing;
   for (const int idx : idxs) {
     CAIRN_ASSIGN_OR_RETURN(const ContentHash key, step.key(idx));
-    if (auto numbers = FindNumbers(key, sources)) {
+    if (auto numbers = FindNumbers(step, key, sources)) {
       (*results)[idx] = std::move(*numbers);
     } else {
       missing.push_back(idx);
@@ -71,6 +74,11 @@ Status WriteResults(const ImageStep& step, const std::vector<int>& idxs,
 }
 
 }  // namespace
+
+bool AreBelow(std::span<const int> numbers, int end) {
+  return std::all_of(numbers.begin(), numbers.end(),
+                     [end](int number) { return 0 <= number && number < end; });
+}
 
 Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageStep& step,
                                                                   SQLite::Database* database, MatchRun* run) {

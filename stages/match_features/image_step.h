@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,14 @@ struct ImageStep {
   std::string name;  // "words"
   // Hash of all that the result of an image depends on.
   std::function<Result<ContentHash>(int idx)> key;
+  // Whether this can be a result: what lies in a file may have been made by somebody else.
+  std::function<bool(const std::vector<int>& numbers)> is_valid;
   // Results of some images, in their order.
   std::function<Result<std::vector<std::vector<int>>>(const std::vector<int>& idxs)> compute;
 };
+
+// Whether all numbers are in [0, end).
+bool AreBelow(std::span<const int> numbers, int end);
 
 // The results of all images, by index, taken over from reuse.files or computed.  A shard that lacks some
 // computes its share of them, writes it to the database and is done: nothing is returned.  A plan leaves them

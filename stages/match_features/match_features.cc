@@ -130,7 +130,7 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
   return ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
     return WithDatabaseErrors(temporary, [&]() -> Status {
       CopyColmapDatabase(run->features, temporary);
-      SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
+      SQLite::Database database = OpenPrivate(temporary);
       database.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
       Harden(database, UINT64_MAX);  // it has the triggers and views of the features' database, if any
       database.exec("BEGIN; DELETE FROM two_view_geometries");
@@ -177,9 +177,11 @@ Status WritePlan(const std::string& plan_path, MatchRun* run) {
     if (!run->is_planned) PlanPairs({}, database, run);  // all are known
     return Ok();
   }));
+  const bool predicts = run->summary.pairs == "frustum" && run->options.num_frustum_seeds > 0;
   return WriteFileAtomically(
       plan_path + kNumShardsSuffix,
-      fmt::format("{}{}\n", run->summary.num_shards_with_work, IsLastPlan(run->summary) ? " last" : ""));
+      fmt::format("{}{}\n", run->summary.num_shards_with_work,
+                  IsLastPlan(run->summary, run->plan->num_shards, predicts) ? " last" : ""));
 }
 
 // `path`: of what the run writes.
@@ -214,7 +216,11 @@ Result<MatchFeaturesSummary> RunMatching(const MatchFeaturesInputs& inputs,
   ReuseOptions sources = reuse;
   if (reuse.shard && !inputs.plan_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(run.planned, ReadPlannedPairs(inputs.plan_path, *reuse.shard, *images));
-    if (run.planned) sources.files.clear();  // the plan knows what they have
+    if (run.planned) {
+      sources.files.clear();  // the plan knows what they have
+    } else {
+      sources.files.push_back(inputs.plan_path);  // it may have done a step before
+    }
   }
   CAIRN_ASSIGN_OR_RETURN(summary.not_reused, AddReuseSources(sources, path, &run.named, &run.previous));
   cv::setNumThreads(1);  // pairs are the unit of parallel work

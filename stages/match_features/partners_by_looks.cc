@@ -25,6 +25,8 @@ ImageStep WordsStep(const Vocabulary& vocabulary, MatchRun* run) {
                                                            run->images.descriptor_kind));
             return ContentHasher().Text("words").Hash(tree).Hash(HashFeatures({}, descriptors)).Finish();
           },
+          .is_valid = [num_words = vocabulary.num_words()](
+                          const std::vector<int>& words) { return AreBelow(words, num_words); },
           .compute =
               [run, &vocabulary](const std::vector<int>& idxs) {
                 return QuantizeImages(run->features, run->images, idxs, vocabulary, run->num_threads,
@@ -41,6 +43,8 @@ ImageStep PartnersStep(const LooksRule& rule, const std::vector<std::vector<Word
           .key = [all = hasher.Finish()](int idx) -> Result<ContentHash> {
             return ContentHasher().Hash(all).UInt(idx).Finish();
           },
+          .is_valid = [num_images = static_cast<int>(words.size())](
+                          const std::vector<int>& partners) { return AreBelow(partners, num_images); },
           .compute = [&rule, &words,
                       num_words](const std::vector<int>& idxs) -> Result<std::vector<std::vector<int>>> {
             return rule.partners(ImageSimilarity(words, num_words), idxs);

@@ -40,11 +40,12 @@ int NumShardsOf(int64_t num_items, int64_t min_num_items, int num_shards) {
   return num < 2 ? 0 : num;
 }
 
-bool IsLastPlan(const MatchFeaturesSummary& summary) {
-  const int num_shards = summary.num_shards_with_work;
+bool IsLastPlan(const MatchFeaturesSummary& summary, int num_shards, bool predicts) {
   if (!summary.image_step.empty()) return false;
-  return num_shards == 0 ||
-         (summary.num_rounds >= kFirstPredictedRound && num_shards < kMinNumShardsBeforeAnother);
+  const int num_with_work = summary.num_shards_with_work;
+  return !predicts || num_with_work == 0 ||
+         (summary.num_rounds >= kFirstPredictedRound &&
+          num_with_work < std::min(num_shards, kMinNumShardsBeforeAnother));
 }
 
 void PlanPairs(const IndexPairs& pairs, SQLite::Database& database, MatchRun* run) {

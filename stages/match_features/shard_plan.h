@@ -20,8 +20,9 @@ constexpr char kNumShardsSuffix[] = ".shards";
 // two is not there, and one alone would do no better than the run that merges.
 int NumShardsOf(int64_t num_items, int64_t min_num_items, int num_shards);
 
-// Whether what follows the plan will hardly be divided.
-bool IsLastPlan(const MatchFeaturesSummary& summary);
+// Whether what follows a plan of a run will hardly be divided.  `num_shards`: those that the plan is for;
+// `predicts`: whether matches predict other pairs.
+bool IsLastPlan(const MatchFeaturesSummary& summary, int num_shards, bool predicts);
 
 // Divides the pairs, each shard a contiguous stretch of them.  REQUIRES: a planning run
 void PlanPairs(const IndexPairs& pairs, SQLite::Database& database, MatchRun* run);

@@ -220,6 +220,23 @@ TEST_F(MakeGraph, RunInOnePartRemovesWhatAKilledOneInPartsLeft) {
   for (const std::string& output : outputs) EXPECT_FALSE(fs::exists(output + "-1-1of6.db")) << output;
 }
 
+// The shell in which a rule runs gives way to the stage: make knows no other child to stop.
+TEST_F(MakeGraph, WhoStopsACompileStopsItsStages) {
+  for (const char* const arguments : {"", "--shards 2 --shard-images 8"}) {
+    fs::remove_all(Path("stopped.build"));
+    fs::copy_file(Path("tiny.toml"), Path("stopped.toml"), fs::copy_options::overwrite_existing);
+    const std::string stage = "'[s]tage extract-features.*" + Path("stopped.build") + "'";
+    const ProgramRun run = RunShell(
+        fmt::format("cairn compile {} -o {} {} & until pgrep -f {} > {}; do sleep 0.01; done; kill -TERM $!; "
+                    "wait $!; echo code $?; "
+                    "for i in $(seq 50); do pgrep -f {} || break; sleep 0.1; done",
+                    Path("stopped.toml"), Path("stopped.cairn"), arguments, stage, Path("pids"), stage));
+    EXPECT_THAT(run.out, testing::EndsWith("code 10\n")) << "stages that live on: " << run.out << run.err;
+  }
+  EXPECT_EQ(Compile("stopped").exit_code, 0);
+  EXPECT_EQ(Hash("stopped.cairn"), Hash("tiny.cairn"));
+}
+
 // Compiles with a launcher that runs `change` beside the first stage: before, or after it has read
 // the images.
 class ChangingCapture : public MakeGraph {

@@ -26,16 +26,20 @@ TEST(ShardPlan, AShardHasTheLeastAtLeastAndOneAloneIsNone) {
 }
 
 TEST(ShardPlan, ItIsTheLastWhereTheNextRoundWillHardlyBeDivided) {
-  const auto is_last = [](int num_rounds, int num_shards, const std::string& image_step = "") {
+  const auto is_last = [](int num_rounds, int num_with_work, int num_shards = 8, bool predicts = true,
+                          const std::string& image_step = "") {
     return IsLastPlan(
-        {.num_rounds = num_rounds, .image_step = image_step, .num_shards_with_work = num_shards});
+        {.num_rounds = num_rounds, .image_step = image_step, .num_shards_with_work = num_with_work},
+        num_shards, predicts);
   };
   EXPECT_TRUE(is_last(1, 0));
   EXPECT_FALSE(is_last(1, 2)) << "what the first pairs predict may be more";
   EXPECT_TRUE(is_last(2, 3));
   EXPECT_FALSE(is_last(2, 4));
   EXPECT_TRUE(is_last(3, 3));
-  EXPECT_FALSE(is_last(0, 2, "words"));
+  EXPECT_FALSE(is_last(3, 2, 2)) << "all that there are";
+  EXPECT_TRUE(is_last(1, 8, 8, false)) << "nothing follows";
+  EXPECT_FALSE(is_last(0, 2, 8, false, "words"));
 }
 
 class ShardPlanTest : public MatchFeaturesTest {
@@ -60,6 +64,10 @@ class ShardPlanTest : public MatchFeaturesTest {
     return summary;
   }
 
+  bool IsLast(const MatchFeaturesSummary& planned) const {
+    return IsLastPlan(planned, kNumShards, planned.pairs == "frustum" && options_.num_frustum_seeds > 0);
+  }
+
   // Plans and runs shards until a plan is the last, and returns all files; what was planned is in `rounds_`.
   std::vector<std::string> GoThroughRounds() {
     std::vector<std::string> files;
@@ -72,7 +80,7 @@ class ShardPlanTest : public MatchFeaturesTest {
       rounds_.push_back(*planned);
       const int num_shards = planned->num_shards_with_work;
       EXPECT_EQ(*ReadFile(Path(plan + ".shards")),
-                fmt::format("{}{}\n", num_shards, IsLastPlan(*planned) ? " last" : ""));
+                fmt::format("{}{}\n", num_shards, IsLast(*planned) ? " last" : ""));
       std::vector<std::string> outputs = {Path(plan)};
       int64_t num_done = 0;
       for (int i = 1; i <= num_shards; ++i) {
@@ -86,7 +94,7 @@ class ShardPlanTest : public MatchFeaturesTest {
       }
       EXPECT_EQ(num_done, planned->num_left_to_others) << "the shares are all that was planned";
       files.insert(files.end(), outputs.begin(), outputs.end());
-      if (IsLastPlan(*planned)) break;
+      if (IsLast(*planned)) break;
     }
     return files;
   }
@@ -182,6 +190,44 @@ TEST_F(ShardPlanTest, WhatAnEarlierOutputHasIsNotPlanned) {
   ASSERT_TRUE(planned.ok()) << planned.error().message;
   EXPECT_EQ(planned->num_shards_with_work, 0);
   EXPECT_EQ(*ReadFile(Path("plan.db.shards")), "0 last\n");
+}
+
+// A node died: the plan finds the few words that are missing itself, and leaves the next step to shards.
+TEST_F(ShardPlanTest, ShardsKnowWhatTheirOwnPlanFoundOut) {
+  WriteFeatures(30);
+  ShowAnotherPlace(16);
+  options_.pairs = "retrieval";
+  with_poses_ = false;
+  ASSERT_EQ(PlanTo("plan.db", {})->image_step, "words");
+  std::vector<std::string> files = {Path("plan.db")};
+  for (const int i : {1, 3}) {
+    const std::string name = fmt::format("words{}.db", i);
+    ASSERT_TRUE(ShardTo(name, i, 3, "plan.db", {}).ok());
+    files.push_back(Path(name));
+  }
+  ASSERT_EQ(PlanTo("next.db", files)->image_step, "partners");
+  const auto shard = ShardTo("partners.db", 1, 3, "next.db", files);
+  ASSERT_TRUE(shard.ok()) << shard.error().message;
+  EXPECT_EQ(shard->image_step, "partners");
+}
+
+TEST_F(ShardPlanTest, SeedsThatCannotBeAreFoundAnew) {
+  WriteFeatures(20);
+  ASSERT_EQ(MatchTo("seeds.db", true, {.shard = Shard{1, 1}})->image_step, "seeds");
+  for (const std::vector<int>& numbers : {std::vector<int>{}, {-1}, {2, 1}, {1, 20}, {1, -1}, {0, 1000000}}) {
+    const std::string_view bytes(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(int));
+    {
+      SQLite::Database database(Path("seeds.db"), SQLite::OPEN_READWRITE);
+      SQLite::Statement update(database, "UPDATE cairn_image_steps SET numbers = ?");
+      update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+      update.exec();
+    }
+    auto entries = *ReadReuseFile(Path("seeds.db"));
+    for (ReuseEntry& entry : entries) entry.contents = HashContents(bytes);
+    ASSERT_TRUE(WriteReuseFile(Path("seeds.db"), entries).ok());
+    ASSERT_TRUE(MatchTo("merged.db", true, {.files = {Path("seeds.db")}}).ok());
+    ExpectAsClean("merged.db");
+  }
 }
 
 TEST_F(ShardPlanTest, SameBytesForAnyNumberOfThreads) {

@@ -235,9 +235,9 @@ TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) 
 
 TEST(BuildFiles, NamesAreThoseThatABuildWrites) {
   for (const char* name :
-       {"features.db", "matches-1-2of3.db.stamp", "matches-2-plan.db.shards", "matches-2-plan.stamp", "poses",
-        "capture.stamp", "map.report.json", "features.db.reuse", "classes.db.solved", "lock", "matches.begun",
-        "images.d", "regions.db.tmp-12"})
+       {"features.db", "matches-1-2of3.db.stamp", "matches-2-plan-8-64.db.shards",
+        "matches-2-plan-8-64.stamp", "poses", "capture.stamp", "map.report.json", "features.db.reuse",
+        "classes.db.solved", "lock", "matches.begun", "images.d", "regions.db.tmp-12"})
     EXPECT_TRUE(IsBuildFileName(name)) << name;
   for (const char* name : {"notes.txt", "notes.tmp-2024", "features.db.bak", "my-features.db", "pareto", ""})
     EXPECT_FALSE(IsBuildFileName(name)) << name;
