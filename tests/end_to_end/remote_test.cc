@@ -111,29 +111,29 @@ TEST_F(Remote, ACallThatFailsIsSaidAndTheNextRunMakesTheSameMap) {
       {"fail rename", "EIO"},   {"lost rename", "ENOENT"}, {"fail create", "EACCES"}, {"fail open", "ESTALE"},
       {"fail read", "EIO"},     {"fail mkdir", "EIO"},     {"lost unlink", "ENOENT"}};
   int num_failed = 0;
-  for (const auto& [what, error] : faults) {
+  for (size_t i = 0; i < faults.size(); ++i) {
+    const auto& [what, error] = faults[i];
     const std::string how = what.substr(0, 4), kind = what.substr(5);
     ASSERT_TRUE(counts.contains(kind)) << kind;
-    for (const double part : {0.3, 0.9}) {
-      const int number = std::max(1, static_cast<int>(part * counts.at(kind)));
-      SCOPED_TRACE(fmt::format("--{} {}:{}:{}", how, kind, number, error));
-      StartAgain();
-      ASSERT_NO_FATAL_FAILURE(Mount(fmt::format("--{} {}:{}:{}", how, kind, number, error)));
-      const ProgramRun run = Compile();
-      Unmount();
-      EXPECT_LT(run.exit_code, 64) << run.err;  // no crash
-      if (run.exit_code != 0) {
-        ++num_failed;
-        EXPECT_THAT(run.err, HasSubstr((*folder_ / "place"))) << "which file it was";
-      }
-      ASSERT_NO_FATAL_FAILURE(Mount(""));
-      const ProgramRun next = Compile();
-      Unmount();
-      ASSERT_EQ(next.exit_code, 0) << next.err << "\nafter: " << run.err;
-      ExpectSameBytesAsLocal();
+    const double part = i % 2 == 0 ? 0.3 : 0.9;
+    const int number = std::max(1, static_cast<int>(part * counts.at(kind)));
+    SCOPED_TRACE(fmt::format("--{} {}:{}:{}", how, kind, number, error));
+    StartAgain();
+    ASSERT_NO_FATAL_FAILURE(Mount(fmt::format("--{} {}:{}:{}", how, kind, number, error)));
+    const ProgramRun run = Compile();
+    Unmount();
+    EXPECT_LT(run.exit_code, 64) << run.err;  // no crash
+    if (run.exit_code != 0) {
+      ++num_failed;
+      EXPECT_THAT(run.err, HasSubstr((*folder_ / "place"))) << "which file it was";
     }
+    ASSERT_NO_FATAL_FAILURE(Mount(""));
+    const ProgramRun next = Compile();
+    Unmount();
+    ASSERT_EQ(next.exit_code, 0) << next.err << "\nafter: " << run.err;
+    ExpectSameBytesAsLocal();
   }
-  EXPECT_GT(num_failed, 10);
+  EXPECT_GT(num_failed, 5);
 }
 
 }  // namespace

@@ -173,5 +173,28 @@ TEST_F(HardenedDatabase, PipesAndDevicesAreNoDatabases) {
   }
 }
 
+TEST(OpenPrivate, AsksForNoLockAndReadsWhatIsInWalMode) {
+  const std::string path = testing::TempDir() + "/private.db";
+  std::filesystem::remove(path);
+  OpenPrivate(path).exec("CREATE TABLE t (x)");
+  SQLite::Database other(path, SQLite::OPEN_READWRITE);
+  other.exec("BEGIN EXCLUSIVE");
+  OpenPrivate(path).exec("INSERT INTO t VALUES (1)");  // a file system without locks says that it is locked
+  other.exec("ROLLBACK");
+  other.exec("PRAGMA journal_mode = WAL");
+  {
+    SQLite::Database copied = OpenPrivate(path);
+    EXPECT_EQ(copied.execAndGet("SELECT count(*) FROM t").getInt(), 1);
+    copied.exec("PRAGMA journal_mode = DELETE");
+  }
+}
+
+TEST(DatabaseUri, TwoSlashesAreNoHost) {
+  const std::string path = "/" + testing::TempDir() + "/two_slashes.db";
+  std::filesystem::remove(path);
+  OpenPrivate(path).exec("CREATE TABLE t (x)");
+  EXPECT_TRUE(OpenDatabaseReadOnly(path).ok());
+}
+
 }  // namespace
 }  // namespace cairn
