@@ -100,7 +100,7 @@ maps: program  ## Compile every recipe under maps/ whose capture is here
 compile: program  ## Compile MAP=RECIPE.toml or MAP=maps/NAME; in SHARDS=N parts, on a cluster with LAUNCH='srun -n1 -c2'
 	@$(if $(MAP),,$(error which map? make compile MAP=maps/demo, or MAP=RECIPE.toml))
 	@$(CAIRN) compile $(if $(filter %.toml,$(MAP)),$(MAP),$(MAP)/recipe.toml) -o $(MAP:.toml=).cairn \
-	    $(addprefix --shards ,$(SHARDS)) $(if $(LAUNCH),--launch '$(LAUNCH)')
+	    $(addprefix --shards ,$(SHARDS)) $(addprefix --shard-images ,$(SHARD_IMAGES)) $(if $(LAUNCH),--launch '$(LAUNCH)')
 
 install: whole  ## Install program, library, headers, Python module and manual under PREFIX [/usr/local], in DESTDIR
 	@cmake --install build/$(PRESET) --prefix $(PREFIX)
