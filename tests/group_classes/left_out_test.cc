@@ -61,6 +61,17 @@ TEST(LeaveOut, WhatIsLeftOutPullsNothingAndCountsNoMoreThanAnOutlier) {
   EXPECT_NE(LeaveOut({}, problem), before);
 }
 
+TEST(LeaveOut, ItDoesNotMatterWherePointsBeginHoweverLooselyTheSurveyIsSolved) {
+  const Circle circle = MakeCircle(Lens(), Lens(), 0.5, {});
+  BundleProblem moved = circle.problem;
+  for (size_t i = 0; i < moved.points.size(); ++i)
+    moved.points[i] += 0.3 * Eigen::Vector3d(i % 3 - 1.0, i % 5 - 2.0, i % 7 - 3.0).normalized();
+  const double converged =
+      Sum(LeaveOut({.max_num_iterations = 200, .function_tolerance = 1e-9}, circle.problem));
+  EXPECT_NEAR(Sum(LeaveOut({.max_num_iterations = 200, .function_tolerance = 0.3}, moved)) / converged, 1,
+              1e-3);
+}
+
 TEST(LeaveOut, PointsOfFourAreTheFirstOfWhichOneIsLeftOut) {
   Circle circle = MakeCircle(Lens(), Lens(), 0.5, {});
   std::vector<BundleProblem::Observation> four, three;

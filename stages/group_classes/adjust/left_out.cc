@@ -5,6 +5,14 @@
 #include <utility>
 
 namespace cairn::group_classes {
+namespace {
+
+// Points were placed by all keypoints: what has not converged still knows those that are left out, and more
+// of it where poses hardly move than where they go back to what was stated.  With the tolerance of learning
+// (1e-3) 3000 exact poses seemed 2 % worse than adjusted ones.
+constexpr double kTolerance = 1e-6;
+
+}  // namespace
 
 LeftOutErrors LeaveOut(const BundleOptions& options, BundleProblem problem) {
   // One keypoint of each track of four or more.
@@ -22,7 +30,9 @@ LeftOutErrors LeaveOut(const BundleOptions& options, BundleProblem problem) {
     begin = end;
   }
   problem.observations = std::move(kept);
-  AdjustBundle(options, &problem, nullptr);
+  BundleOptions converged = options;
+  converged.function_tolerance = kTolerance;
+  AdjustBundle(converged, &problem, nullptr);
   LeftOutErrors errors(problem.images.size(), 0);
   constexpr double kMaxSquare = 16;
   for (const BundleProblem::Observation& observation : left_out) {
