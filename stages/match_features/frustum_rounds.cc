@@ -52,11 +52,7 @@ Result<PredictionReuse> ReusePredictions(const PredictPairsOptions& options, Mat
   for (const MatchImage& image : run->images.images) {
     CAIRN_ASSIGN_OR_RETURN(const ContentHash image_key,
                            run->keys.OfImage(static_cast<int>(image_keys.size())));
-    ContentHasher hasher;
-    hasher.Hash(image_key);
-    for (const double value : image.cam_from_world->rotation.coeffs()) hasher.Double(value);
-    for (const double value : image.cam_from_world->translation) hasher.Double(value);
-    image_keys.push_back(hasher.Finish());
+    image_keys.push_back(ContentHasher().Hash(image_key).Hash(HashPose(*image.cam_from_world)).Finish());
     generations.push_back(GenerationOfSession(image.session));
   }
   return PredictionReuse(image_keys, std::move(generations), options);
@@ -102,12 +98,8 @@ ContentHasher HashRanking(const std::vector<PosedCamera>& posed, const FrustumOv
   ContentHasher hasher;
   hasher.Double(options.near_m).Double(options.far_m).Double(options.min_overlap_ratio);
   hasher.Double(options.max_view_angle_deg).Double(options.max_scale_ratio);
-  for (const PosedCamera& image : posed) {
-    hasher.UInt(static_cast<uint64_t>(image.camera.model)).UInt(image.camera.width).UInt(image.camera.height);
-    for (const double parameter : image.camera.params) hasher.Double(parameter);
-    for (const double value : image.cam_from_world.rotation.coeffs()) hasher.Double(value);
-    for (const double value : image.cam_from_world.translation) hasher.Double(value);
-  }
+  for (const PosedCamera& image : posed)
+    hasher.Hash(HashCamera(image.camera)).Hash(HashPose(image.cam_from_world));
   return hasher;
 }
 

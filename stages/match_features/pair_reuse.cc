@@ -8,14 +8,6 @@
 namespace cairn::match_features {
 namespace {
 
-ContentHash HashCamera(const Camera& camera) {
-  ContentHasher hasher;
-  hasher.UInt(static_cast<uint64_t>(camera.model)).UInt(camera.width).UInt(camera.height);
-  hasher.UInt(camera.has_focal_prior ? 1 : 0);
-  for (const double parameter : camera.params) hasher.Double(parameter);
-  return hasher.Finish();
-}
-
 ContentHash HashGeometry(const TwoViewGeometry& geometry) {
   ContentHasher hasher;
   hasher.UInt(static_cast<uint64_t>(geometry.config));
@@ -53,6 +45,21 @@ std::optional<TwoViewGeometry> ReadRow(SQLite::Database& database, int64_t pair_
 
 }  // namespace
 
+ContentHash HashCamera(const Camera& camera) {
+  ContentHasher hasher;
+  hasher.UInt(static_cast<uint64_t>(camera.model)).UInt(camera.width).UInt(camera.height);
+  hasher.UInt(camera.has_focal_prior ? 1 : 0);
+  for (const double parameter : camera.params) hasher.Double(parameter);
+  return hasher.Finish();
+}
+
+ContentHash HashPose(const Pose& pose) {
+  ContentHasher hasher;
+  for (const double value : pose.rotation.coeffs()) hasher.Double(value);
+  for (const double value : pose.translation) hasher.Double(value);
+  return hasher.Finish();
+}
+
 PairKeys::PairKeys(SQLite::Database& features, const MatchImages& images, const MatchPairsOptions& options)
     : features_(features), images_(images), image_keys_(images.images.size()) {
   MatchPairsOptions described = options;
@@ -83,10 +90,7 @@ Result<ContentHash> PairKeys::Of(const std::pair<int, int>& pair) {
   key.Hash(options_).Hash(image_key1).Hash(image_key2);
   const std::optional<Pose> stated = StatedRelativePose(images_.images[pair.first].cam_from_world,
                                                         images_.images[pair.second].cam_from_world);
-  if (stated) {
-    for (const double value : stated->rotation.coeffs()) key.Double(value);
-    for (const double value : stated->translation) key.Double(value);
-  }
+  if (stated) key.Hash(HashPose(*stated));
   return key.Finish();
 }
 

@@ -13,6 +13,10 @@
 
 namespace cairn::match_features {
 
+// All that results depend on of a camera, and of a pose.
+ContentHash HashCamera(const Camera& camera);
+ContentHash HashPose(const Pose& pose);
+
 // The result of matching and verifying a pair.
 struct PairResult {
   TwoViewGeometry geometry;  // no inliers: not verified

@@ -20,7 +20,8 @@ inline constexpr char kFilmModuleName[] = "cairn_film_module";
 
 const char* FilmModuleVersion();
 
-// LoadModule (core/modules/module.h) of this one.
+// The program's, or another one (core/modules/module.h).
+Result<const FilmModule*> LoadFilmModule();
 Result<const FilmModule*> LoadFilmModule(const std::string& path);
 
 }  // namespace cairn::pipeline

@@ -4,28 +4,18 @@
 
 #include "core/capture/film_file.h"
 #include "core/files/input_file.h"
-#include "core/modules/program_files.h"
 #include "pipeline/exchange/film/film_module.h"
 
 namespace cairn::pipeline {
-namespace {
 
 namespace fs = std::filesystem;
-
-Result<const FilmModule*> ModuleOfProgram() {
-  CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
-  CAIRN_ASSIGN_OR_RETURN(const std::string module, InstalledPath(program, "lib/cairn/film.so"));
-  return LoadFilmModule(module);
-}
-
-}  // namespace
 
 Result<std::unique_ptr<FilmReader>> FilmReader::Open(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
   std::error_code error;
   if (fs::file_size(path, error) == 0 && !error)
     return MakeError(ErrorCode::kEmptyFile, "{}: zero bytes; copy the film again", path);
-  const Result<const FilmModule*> module = ModuleOfProgram();
+  const Result<const FilmModule*> module = LoadFilmModule();
   if (!module.ok()) {
     return MakeError(module.error().code, "{}: films cannot be read here: {}", path, module.error().message);
   }

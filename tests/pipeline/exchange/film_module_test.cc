@@ -83,7 +83,7 @@ TEST_F(FilmModuleTest, WithoutFfmpegSaysWhatToInstall) {
                                                           "libavutil[0-9]+ libswscale[0-9]+\\)$")));
 }
 
-// As where memory is too tightly limited: there is nothing to install.
+// As where a file is damaged: there is nothing to install.
 TEST_F(FilmModuleTest, WithALibraryThatIsThereButCannotBeLoadedDoesNotSayThatItIsMissing) {
   const std::string bytes = ReadFile(Module()).value();
   const std::string library = bytes.c_str() + bytes.find("libavformat.so.");
