@@ -24,7 +24,7 @@ while read -r file; do
   [[ $said == *aarch64* && $said == *", stripped"* ]] || { echo "$file: $said" >&2; exit 1; }
   num_binaries=$((num_binaries + 1))
 done < <(find "${names[@]/#/$folder/}" -type f)
-((num_binaries == 4)) || { echo "$num_binaries programs and libraries, expected the program, its films, the library, Python's module" >&2; exit 1; }
+((num_binaries == 5)) || { echo "$num_binaries programs and libraries, expected the program, its modules for images and films, the library, Python's module" >&2; exit 1; }
 [[ -f $folder/python3-cairn/usr/lib/python3/dist-packages/cairn/_cairn.cpython-311-aarch64-linux-gnu.so ]]
 ! grep -rn "$(dirname "$folder")" "$folder/libcairn-runtime-dev" || { echo "a path of the build is in the headers' package" >&2; exit 1; }
 
