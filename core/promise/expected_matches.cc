@@ -47,9 +47,21 @@ constexpr double kAngleUnitDeg = 20;
 constexpr double kOctavesUnit = 0.5;
 // An image taken anywhere may find what this many of the survey's images nearest to it saw.
 constexpr size_t kMaxNumNearest = 32;
+// From there on sights weigh nothing: WeightAt is less than kLeastWeight.
+constexpr double kMostSquared = 42;
+// Bodies of ParallelFor that need room for each image take so many classes, images or poses at a time.
+constexpr int64_t kAtOnce = 256;
 
 // Of a sight from a view at this square of a distance.
 double WeightAt(double squared) { return std::exp(-squared / (2 * kKernelWidth * kKernelWidth)); }
+
+// Calls body(first, last) for ranges of [0, num).
+template <class Body>
+void ForRanges(size_t num, int num_threads, const Body& body) {
+  const auto count = static_cast<int64_t>(num);
+  ParallelFor((count + kAtOnce - 1) / kAtOnce, num_threads,
+              [&](int64_t range) { body(range * kAtOnce, std::min(count, (range + 1) * kAtOnce)); });
+}
 
 struct View {
   Pose cam_from_world;
@@ -74,14 +86,16 @@ class Learner {
                         {}});
     }
     seen_by_.resize(classes.classes.size());
+    seen_in_.resize(views_.size());
     for (size_t i = 0; i < classes.classes.size(); ++i) {
       for (const Observation& observation : classes.classes[i].observations) {
         const auto image = index.find(observation.image_id);
         if (image == index.end()) continue;
         seen_by_[i].push_back(image->second);
+        seen_in_[image->second].push_back(static_cast<uint32_t>(i));
       }
     }
-    FindNear();
+    ForRanges(views_.size(), num_threads, [&](int64_t first, int64_t last) { FindNear(first, last); });
     if (views_.size() > kMaxImagesInTable) return;
     weights_.resize(views_.size() * views_.size());
     ParallelFor(static_cast<int64_t>(views_.size()), num_threads, [&](int64_t a) {
@@ -218,10 +232,12 @@ class Learner {
 
   const ViewDistance& distance() const { return distance_; }
   const std::vector<int32_t>& seen_by(size_t i) const { return seen_by_[i]; }
+  const std::vector<uint32_t>& seen_in(int32_t image) const { return seen_in_[image]; }
 
  private:
   double Weight(int32_t a, int32_t b) const {
-    return weights_.empty() ? WeightAt(distance_.Squared(a, b)) : weights_[a * views_.size() + b];
+    return weights_.empty() ? WeightAt(distance_.tree().SquaredUpTo(kMostSquared, a, b))
+                            : weights_[a * views_.size() + b];
   }
 
   // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
@@ -247,25 +263,30 @@ class Learner {
            IsInView(*view.camera, view.cam_from_world, classes_.classes[i].position);
   }
 
-  void FindNear() {
-    std::vector<std::unordered_map<int32_t, int>> shared(views_.size());
-    for (const std::vector<int32_t>& images : seen_by_) {
-      for (const int32_t a : images) {
-        for (const int32_t b : images) {
-          if (a != b) ++shared[a][b];
+  // Of the images [first, last).
+  void FindNear(int64_t first, int64_t last) {
+    std::vector<int> num_shared(views_.size(), 0);
+    std::vector<int32_t> sharing;
+    std::vector<std::pair<int, int32_t>> order;
+    for (int64_t a = first; a < last; ++a) {
+      sharing.clear();
+      for (const uint32_t i : seen_in_[a]) {
+        for (const int32_t b : seen_by_[i]) {
+          if (num_shared[b]++ == 0) sharing.push_back(b);
         }
       }
-    }
-    for (size_t a = 0; a < views_.size(); ++a) {
-      std::vector<std::pair<int, int32_t>> order;
-      for (const auto& [b, num] : shared[a]) {
-        if (num >= kMinNumShared) order.emplace_back(-num, b);
+      order.clear();
+      for (const int32_t b : sharing) {
+        if (b != a && num_shared[b] >= kMinNumShared) order.emplace_back(-num_shared[b], b);
+        num_shared[b] = 0;
       }
-      std::sort(order.begin(), order.end());
-      if (order.size() > kMaxNumNear) order.resize(kMaxNumNear);
-      views_[a].near.push_back(static_cast<int32_t>(a));
-      for (const auto& [num, b] : order) views_[a].near.push_back(b);
-      std::sort(views_[a].near.begin(), views_[a].near.end());
+      const size_t num = std::min(kMaxNumNear, order.size());
+      std::partial_sort(order.begin(), order.begin() + static_cast<ptrdiff_t>(num), order.end());
+      std::vector<int32_t>& near = views_[a].near;
+      near.reserve(num + 1);
+      near.push_back(static_cast<int32_t>(a));
+      for (size_t n = 0; n < num; ++n) near.push_back(order[n].second);
+      std::sort(near.begin(), near.end());
     }
   }
 
@@ -273,8 +294,9 @@ class Learner {
   const ViewDistance distance_;
   SessionEvidence evidence_;
   std::vector<View> views_;
-  std::vector<std::vector<int32_t>> seen_by_;
-  std::vector<float> weights_;  // of all pairs; empty: too many images
+  std::vector<std::vector<int32_t>> seen_by_;   // per class: images
+  std::vector<std::vector<uint32_t>> seen_in_;  // per image: classes
+  std::vector<float> weights_;                  // of all pairs; empty: too many images
 };
 
 // Maximum likelihood of logistic regression by Newton's method, with a weak pull to 0.
@@ -307,18 +329,14 @@ class MatchModel::Impl {
   Impl(const Classes& classes, const ViewOptions& options, int num_threads)
       : classes_(classes), learner_(classes, options, num_threads), lookers_(classes.classes.size()) {
     const auto num_classes = static_cast<int64_t>(lookers_.size());
-    constexpr int64_t kBlock = 256;
-    ParallelFor((num_classes + kBlock - 1) / kBlock, num_threads, [&](int64_t block) {
+    ForRanges(lookers_.size(), num_threads, [&](int64_t first, int64_t last) {
       std::vector<char> is_candidate(classes.images.size(), 0);
-      for (int64_t i = block * kBlock; i < std::min(num_classes, (block + 1) * kBlock); ++i)
-        lookers_[i] = learner_.LookersOf(i, &is_candidate);
+      for (int64_t i = first; i < last; ++i) lookers_[i] = learner_.LookersOf(i, &is_candidate);
     });
-    seen_in_.resize(classes.images.size());
     int64_t num_looking = 0, num_seen = 0;
     for (int64_t i = 0; i < num_classes; ++i) {
       num_looking += static_cast<int64_t>(lookers_[i].images.size());
       num_seen += static_cast<int64_t>(learner_.seen_by(i).size());
-      for (const int32_t image : learner_.seen_by(i)) seen_in_[image].push_back(i);
     }
     if (num_looking == 0) return;
     prior_ = static_cast<double>(num_seen) / static_cast<double>(num_looking);
@@ -369,37 +387,13 @@ class MatchModel::Impl {
     return matches;
   }
 
-  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, int session,
-                             Where where) const {
-    const size_t num_images = classes_.images.size();
-    std::vector<double> squared(num_images), weights(num_images);
-    std::vector<size_t> nearest(num_images);
-    for (size_t image = 0; image < num_images; ++image) {
-      squared[image] = distance().Squared(cam_from_world, image);
-      weights[image] = WeightAt(squared[image]);
-      nearest[image] = image;
-    }
-    const size_t num_nearest = std::min(num_images, kMaxNumNearest);
-    std::partial_sort(
-        nearest.begin(), nearest.begin() + static_cast<ptrdiff_t>(num_nearest), nearest.end(),
-        [&](size_t a, size_t b) { return std::pair(squared[a], a) < std::pair(squared[b], b); });
-    std::vector<size_t> candidates;
-    for (size_t n = 0; n < num_nearest; ++n)
-      candidates.insert(candidates.end(), seen_in_[nearest[n]].begin(), seen_in_[nearest[n]].end());
-    std::sort(candidates.begin(), candidates.end());
-    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
-
-    const Eigen::Vector3d center = cam_from_world.Center();
-    const auto which = where == Where::kThere ? Learner::Sights::kFromThere : Learner::Sights::kFromNearby;
-    std::vector<ClassMatch> matches;
-    for (const size_t i : candidates) {
-      if (!IsInView(camera, cam_from_world, classes_.classes[i].position)) continue;
-      FeatureVector features;
-      if (learner_.Describe(
-              lookers_[i], learner_.DirectionTo(i, center), session, prior_, which,
-              [&](int32_t image) { return weights[image]; }, &features))
-        matches.push_back({i, FoundAgain(i, features)});
-    }
+  std::vector<std::vector<ClassMatch>> At(const std::vector<Look>& looks, Where where,
+                                          int num_threads) const {
+    std::vector<std::vector<ClassMatch>> matches(looks.size());
+    ForRanges(looks.size(), num_threads, [&](int64_t first, int64_t last) {
+      std::vector<double> weights(classes_.images.size(), kUnknown);
+      for (int64_t n = first; n < last; ++n) matches[n] = AtOne(looks[n], where, &weights);
+    });
     return matches;
   }
 
@@ -407,6 +401,39 @@ class MatchModel::Impl {
   const SessionEvidence& evidence() const { return learner_.evidence(); }
 
  private:
+  static constexpr double kUnknown = -1;
+
+  // `weights`: per image kUnknown, before and after; it is used.
+  std::vector<ClassMatch> AtOne(const Look& look, Where where, std::vector<double>* weights) const {
+    std::vector<uint32_t> candidates;
+    for (const int32_t image : distance().tree().Nearest(look.cam_from_world, kMaxNumNearest))
+      candidates.insert(candidates.end(), learner_.seen_in(image).begin(), learner_.seen_in(image).end());
+    std::sort(candidates.begin(), candidates.end());
+    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+
+    const Eigen::Vector3d center = look.cam_from_world.Center();
+    const auto which = where == Where::kThere ? Learner::Sights::kFromThere : Learner::Sights::kFromNearby;
+    std::vector<int32_t> weighed;
+    const auto weight_of = [&](int32_t image) {
+      double& weight = (*weights)[image];
+      if (weight == kUnknown) {
+        weight = WeightAt(distance().tree().Squared(look.cam_from_world, image));
+        weighed.push_back(image);
+      }
+      return weight;
+    };
+    std::vector<ClassMatch> matches;
+    for (const uint32_t i : candidates) {
+      if (!IsInView(*look.camera, look.cam_from_world, classes_.classes[i].position)) continue;
+      FeatureVector features;
+      if (learner_.Describe(lookers_[i], learner_.DirectionTo(i, center), look.session, prior_, which,
+                            weight_of, &features))
+        matches.push_back({i, FoundAgain(i, features)});
+    }
+    for (const int32_t image : weighed) (*weights)[image] = kUnknown;
+    return {matches.begin(), matches.end()};  // without the room of more
+  }
+
   // What is gone is found by nobody.
   float FoundAgain(size_t i, const FeatureVector& features) const {
     return classes_.classes[i].age.presence * static_cast<float>(Probability(weights_, features));
@@ -414,9 +441,8 @@ class MatchModel::Impl {
 
   const Classes& classes_;
   Learner learner_;
-  std::vector<Learner::Lookers> lookers_;     // per class
-  std::vector<std::vector<size_t>> seen_in_;  // per image: classes
-  double prior_ = 0;                          // share of those that look at a class which see it
+  std::vector<Learner::Lookers> lookers_;  // per class
+  double prior_ = 0;                       // share of those that look at a class which see it
   FeatureVector weights_ = FeatureVector::Zero();
   int64_t num_learnt_from_ = 0;
 };
@@ -429,9 +455,9 @@ MatchModel& MatchModel::operator=(MatchModel&&) noexcept = default;
 
 ExpectedMatches MatchModel::OfViews(int num_threads) const { return impl_->OfViews(num_threads); }
 
-std::vector<ClassMatch> MatchModel::At(const Camera& camera, const Pose& cam_from_world, int session,
-                                       Where where) const {
-  return impl_->At(camera, cam_from_world, session, where);
+std::vector<std::vector<ClassMatch>> MatchModel::At(const std::vector<Look>& looks, Where where,
+                                                    int num_threads) const {
+  return impl_->At(looks, where, num_threads);
 }
 
 const ViewDistance& MatchModel::distance() const { return impl_->distance(); }

@@ -35,7 +35,7 @@ struct ExpectedMatches {
 
 // A class, and the probability that a robot's image finds it.
 struct ClassMatch {
-  size_t i = 0;  // position in Classes::classes
+  uint32_t i = 0;  // position in Classes::classes
   float probability = 0;
 };
 
@@ -57,10 +57,14 @@ class MatchModel {
     kThere,   // exactly there: the pose is known
     kNearby,  // about one view's radius from there
   };
-  // The classes that an image taken there, when this session's were taken (-1: at any time), may find,
-  // ascending.  Const and safe from any thread.
-  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, int session,
-                             Where where) const;
+  // An image that is taken somewhere.
+  struct Look {
+    const Camera* camera = nullptr;
+    Pose cam_from_world;
+    int session = -1;  // when this session's were taken; -1: at any time
+  };
+  // Per look, the classes that it may find, ascending.  Const and safe from any thread.
+  std::vector<std::vector<ClassMatch>> At(const std::vector<Look>& looks, Where where, int num_threads) const;
 
   const ViewDistance& distance() const;
   const SessionEvidence& evidence() const;

@@ -11,8 +11,6 @@
 namespace cairn {
 namespace {
 
-// Up to so many, sights are computed once and kept: 56 bytes each.
-constexpr size_t kMaxKeptSights = 1 << 24;
 // Far from underflow: a factor is 1e-12 at least.
 constexpr double kLeastProduct = 1e-200;
 
@@ -35,13 +33,13 @@ class LandmarkOrder::Impl {
       views_.push_back({row.cam_from_world, sights_.FocalOf(row.image_id)});
     }
     for (size_t n = 0; n < pool_.size(); ++n) heap_[n].n = n;
-    size_t num_sights = 0;
-    for (const size_t i : pool_) num_sights += matches_.of_class[i].size();
-    if (num_sights <= kMaxKeptSights) {
-      kept_sights_.resize(pool_.size());
-      ParallelFor(static_cast<int64_t>(pool_.size()), num_threads_,
-                  [&](int64_t n) { kept_sights_[n] = SightsOf(pool_[n]); });
-    }
+    size_t num_kept = 0, num_sights = 0;
+    while (num_kept < pool_.size() &&
+           num_sights + matches_.of_class[pool_[num_kept]].size() <= options.max_num_kept_sights)
+      num_sights += matches_.of_class[pool_[num_kept++]].size();
+    kept_sights_.resize(num_kept);
+    ParallelFor(static_cast<int64_t>(num_kept), num_threads_,
+                [&](int64_t n) { kept_sights_[n] = SightsOf(pool_[n]); });
     TakeFirst(options.first);
   }
 
@@ -128,10 +126,10 @@ class LandmarkOrder::Impl {
   // Calls with the sights of the n-th of the pool.
   template <class Body>
   void WithSights(size_t n, const Body& body) const {
-    if (kept_sights_.empty()) {
-      body(SightsOf(pool_[n]));
-    } else {
+    if (n < kept_sights_.size()) {
       body(kept_sights_[n]);
+    } else {
+      body(SightsOf(pool_[n]));
     }
   }
 
@@ -170,7 +168,7 @@ class LandmarkOrder::Impl {
   std::vector<View> views_;
   std::vector<double> lack_;  // per view: exp(-m_v / e)
   PoseInformation information_;
-  std::vector<std::vector<Sight>> kept_sights_;  // of the pool; empty: too many
+  std::vector<std::vector<Sight>> kept_sights_;  // of the first of the pool
   std::vector<Candidate> heap_;                  // of those not yet taken
   std::vector<size_t> order_;
   size_t next_refresh_ = 0;

@@ -17,6 +17,9 @@ struct LandmarkOrderOptions {
   // the pool, once
   std::vector<size_t> first = {};
   KeypointErrors keypoints;
+  // Sights of the first of the pool that are computed once and kept, 56 bytes each; the others whenever they
+  // are wanted.  The same order.
+  size_t max_num_kept_sights = size_t{1} << 24;
 };
 
 // Orders classes so that, for any n, the first n of them serve robots in the survey's views best: a small map

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "core/capture/sessions.h"
 
@@ -22,15 +23,22 @@ std::vector<int32_t> LaterViews(const Classes& classes, const ViewDistance& dist
   std::iota(latest_first.begin(), latest_first.end(), 0);
   std::stable_sort(latest_first.begin(), latest_first.end(),
                    [&](int32_t a, int32_t b) { return session[a] > session[b]; });
-  std::vector<int32_t> of_today;  // so far
-  for (const int32_t image : latest_first) {
-    double least = kReach * kReach;
-    for (const int32_t other : of_today) {
-      if (session[other] <= session[image]) break;
-      const double squared = distance.Squared(image, other);
-      if (session[image] >= 0 && squared < least) least = squared, later[image] = other;
+  constexpr int32_t kNotYet = -1;
+  std::vector<int32_t> turn(later.size(), kNotYet);  // of those of today so far: when they came
+  for (int32_t n = 0; n < std::ssize(latest_first); ++n) {
+    const int32_t image = latest_first[n];
+    std::pair<double, int32_t> nearest(kReach * kReach, kNotYet);  // of equals the one that came first
+    if (session[image] >= 0) {
+      distance.tree().ForNear(image, kReach * kReach, [&](int32_t other, double squared) {
+        if (turn[other] != kNotYet && session[other] > session[image])
+          nearest = std::min(nearest, std::pair(squared, turn[other]));
+      });
     }
-    if (later[image] < 0) of_today.push_back(image);
+    if (nearest.second != kNotYet) {
+      later[image] = latest_first[nearest.second];
+    } else {
+      turn[image] = n;
+    }
   }
   return later;
 }

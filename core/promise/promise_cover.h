@@ -25,7 +25,7 @@ std::vector<double> Demands(const std::vector<std::vector<ExpectedMatch>>& of_cl
                             double needed, double reachable_ratio);
 
 // Per node, the classes that it expects, ascending, with their probabilities.
-using ClassesOfNodes = std::vector<std::vector<std::pair<size_t, float>>>;
+using ClassesOfNodes = std::vector<std::vector<ClassMatch>>;
 
 // CoverFast of these nodes alone, by the classes that they expect, at the cost of these.  Of `taken`
 // (ascending) those are in it that one of the nodes expects.

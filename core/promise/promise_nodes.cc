@@ -29,11 +29,11 @@ Pose PoseBetween(const Pose& a, const Pose& b, int part, int num_parts) {
 std::vector<int32_t> ImagesApart(const ViewDistance& distance, const std::vector<int32_t>& images,
                                  double spacing) {
   std::vector<int32_t> chosen;
+  std::vector<char> is_covered(distance.tree().size(), 0);
   for (const int32_t image : images) {
-    const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](int32_t other) {
-      return distance.Squared(image, other) < spacing * spacing;
-    });
-    if (!is_near) chosen.push_back(image);
+    if (is_covered[image] != 0) continue;
+    chosen.push_back(image);
+    distance.tree().ForNear(image, spacing * spacing, [&](int32_t other, double) { is_covered[other] = 1; });
   }
   return chosen;
 }
@@ -43,6 +43,8 @@ std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance
   std::unordered_map<CameraId, double> view_deg;
   for (const Camera& camera : classes.cameras) view_deg[camera.camera_id] = FieldOfViewDeg(camera);
   const std::vector<int32_t> images = ImagesApart(distance, of_images, kViewSpacing);
+  std::vector<char> is_apart(classes.images.size(), 0);
+  for (const int32_t image : images) is_apart[image] = 1;
   std::vector<PromiseNode> nodes;
   for (const int32_t image : images) nodes.push_back({classes.images[image].cam_from_world, image, image});
 
@@ -52,9 +54,10 @@ std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance
   for (size_t n = 0; n < images.size(); ++n) {
     const int32_t a = images[n];
     std::vector<int32_t> here;  // at the same place, looking elsewhere
-    for (const int32_t b : images) {
-      if (CenterErrorM(pose_of(a), pose_of(b)) < distance.radius()) here.push_back(b);
-    }
+    distance.tree().ForPlacesNear(pose_of(a).Center(), distance.radius(), [&](int32_t b) {
+      if (is_apart[b] != 0) here.push_back(b);
+    });
+    std::sort(here.begin(), here.end());
     for (const int32_t b : here) {
       if (b <= a || classes.images[b].camera_id != classes.images[a].camera_id) continue;
       const double turn_deg = RotationErrorDeg(pose_of(a), pose_of(b));

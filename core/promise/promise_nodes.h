@@ -34,7 +34,7 @@ std::vector<int32_t> ImagesApart(const ViewDistance& distance, const std::vector
 
 // Images that lie apart, and, where the survey looked several ways from one place (lattices), headings
 // between two neighbouring ones that see some of the same: a robot looks any way.  Of these images,
-// ascending. O(images^2).
+// ascending.  O(images log images), and the squares of the numbers taken at one place.
 std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance,
                                       const std::vector<int32_t>& of_images);
 

@@ -18,21 +18,14 @@ constexpr double kMetTolerance = 1e-6;
 // Per node the nearest others, and those whose nearest it is, ascending.
 std::vector<std::vector<int32_t>> Neighbours(const std::vector<PromiseNode>& nodes, double radius,
                                              double radius_deg) {
+  std::vector<Pose> poses;
+  for (const PromiseNode& node : nodes) poses.push_back(node.cam_from_world);
+  const ViewTree tree(poses, radius, radius_deg);
   std::vector<std::vector<int32_t>> neighbours(nodes.size());
-  std::vector<std::pair<double, int32_t>> order;
-  for (size_t a = 0; a < nodes.size(); ++a) {
-    order.clear();
-    for (size_t b = 0; b < nodes.size(); ++b) {
-      if (a == b) continue;
-      order.emplace_back(
-          ViewDistanceSquared(nodes[a].cam_from_world, nodes[b].cam_from_world, radius, radius_deg),
-          static_cast<int32_t>(b));
-    }
-    const size_t num = std::min(kNumNeighbours, order.size());
-    std::partial_sort(order.begin(), order.begin() + static_cast<ptrdiff_t>(num), order.end());
-    for (size_t n = 0; n < num; ++n) {
-      neighbours[a].push_back(order[n].second);
-      neighbours[order[n].second].push_back(static_cast<int32_t>(a));
+  for (int32_t a = 0; a < std::ssize(nodes); ++a) {
+    for (const int32_t b : tree.Nearest(poses[a], kNumNeighbours, a)) {
+      neighbours[a].push_back(b);
+      neighbours[b].push_back(a);
     }
   }
   for (std::vector<int32_t>& list : neighbours) {
@@ -53,7 +46,7 @@ class Divider {
     for (size_t i = 0; i < keep.size(); ++i) {
       if (keep[i] == 0) continue;
       for (const ExpectedMatch& match : (*problem.of_class)[i])
-        of_node_[match.view].push_back({i, match.probability});
+        of_node_[match.view].push_back({static_cast<uint32_t>(i), match.probability});
     }
   }
 

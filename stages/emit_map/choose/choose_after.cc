@@ -125,7 +125,7 @@ class RegionsAfter {
     for (size_t i = 0; i < keep_.size(); ++i) {
       if (keep_[i] == 0) continue;
       for (const ExpectedMatch& match : (*problem.of_class)[i])
-        of_node[match.view].push_back({i, match.probability});
+        of_node[match.view].push_back({static_cast<uint32_t>(i), match.probability});
     }
     std::vector<double> demands = problem.demands;
     for (double& demand : demands) demand *= kMetRatio;
@@ -170,7 +170,7 @@ std::vector<size_t> StillThere(const std::vector<char>& may_keep, const Previous
 
 ChosenAfter ChooseAfter(const Classes& classes, const std::vector<char>& may_keep, const MapRows& previous,
                         const PreviousMatches& matches, const PromiseOptions& options, int num_threads) {
-  const PromiseMaker maker(classes, num_threads);
+  const PromiseMaker maker(classes, MatchModel(classes, {}, num_threads), num_threads);
   const PromiseBasis basis{previous.findings.promise->model, previous.findings.promise->left_out};
   ChosenAfter chosen;
   chosen.keep = maker.Complete(StillThere(may_keep, matches), basis.model, options,

@@ -209,8 +209,10 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   }
   bits_tried.insert(bits_tried.begin(), options.descriptor_bits);
 
-  const PromiseMaker maker(classes, num_threads);
-  const std::vector<size_t> order = maker.Order(pool).First(pool.size());
+  std::optional<MatchModel> model(std::in_place, classes, ViewOptions(), num_threads);
+  const std::vector<size_t> order = OrderOf(classes, *model, pool, {}, num_threads).First(pool.size());
+  const PromiseMaker maker(classes, *model, num_threads);
+  model.reset();
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
   for (const int bits : bits_tried) {
@@ -332,10 +334,14 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   }
   // The maps that were tried make room for what the whole survey takes.
   const PromiseBasis basis = PromiseMaker::BasisOf(Trials(*std::move(trials)).fared(), options.promise);
-  const PromiseMaker maker(classes, num_threads);
-  const std::vector<size_t> chosen = num_kept < classes.classes.size()
-                                         ? maker.Order(Pool(fitted.keep), first).First(num_kept)
-                                         : Pool(fitted.keep);
+  std::optional<MatchModel> model(std::in_place, classes, ViewOptions(), num_threads);
+  const std::vector<size_t> chosen =
+      num_kept < classes.classes.size()
+          ? OrderOf(classes, *model, Pool(fitted.keep), first, num_threads).First(num_kept)
+          : Pool(fitted.keep);
+  // It takes as much as the promises.
+  const PromiseMaker maker(classes, *model, num_threads);
+  model.reset();
   fitted.keep = maker.Complete(chosen, basis.model, options.promise);
   fitted.promises = maker.Promise(fitted.keep, basis, options.promise);
   progress.Advance();

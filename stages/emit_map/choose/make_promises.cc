@@ -32,31 +32,37 @@ std::vector<PromiseOutcome> Outcomes(const std::vector<PromiseTrial>& fared, con
 
 }  // namespace
 
-PromiseMaker::PromiseMaker(const Classes& classes, int num_threads)
+LandmarkOrder OrderOf(const Classes& classes, const MatchModel& model, std::vector<size_t> pool,
+                      std::vector<size_t> first, int num_threads) {
+  LandmarkOrderOptions options;
+  options.first = std::move(first);
+  return {classes, model.OfViews(num_threads), std::move(pool), options, num_threads};
+}
+
+PromiseMaker::PromiseMaker(const Classes& classes, const MatchModel& model, int num_threads)
     : classes_(classes),
       num_threads_(num_threads),
-      model_(classes, {}, num_threads),
+      distance_(model.distance()),
       sights_(classes, {}),
-      nodes_(PromiseNodes(classes, model_.distance(), ImagesOfToday(LaterViews(classes, model_.distance())))),
-      of_node_(nodes_.size()),
+      nodes_(PromiseNodes(classes, distance_, ImagesOfToday(LaterViews(classes, distance_)))),
       of_class_(classes.classes.size()) {
   std::unordered_map<CameraId, const Camera*> cameras;
   for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
-  ParallelFor(static_cast<int64_t>(nodes_.size()), num_threads, [&](int64_t node) {
-    const Camera& camera = *cameras.at(classes.images[nodes_[node].image].camera_id);
-    of_node_[node] = model_.At(camera, nodes_[node].cam_from_world,
-                               model_.evidence().SessionOf(nodes_[node].image), MatchModel::Where::kNearby);
-  });
+  std::vector<MatchModel::Look> looks;
+  for (const PromiseNode& node : nodes_) {
+    looks.push_back({cameras.at(classes.images[node.image].camera_id), node.cam_from_world,
+                     model.evidence().SessionOf(node.image)});
+  }
+  of_node_ = model.At(looks, MatchModel::Where::kNearby, num_threads);
+  std::vector<size_t> num_of_class(of_class_.size(), 0);
+  for (const std::vector<ClassMatch>& matches : of_node_) {
+    for (const ClassMatch& match : matches) ++num_of_class[match.i];
+  }
+  for (size_t i = 0; i < of_class_.size(); ++i) of_class_[i].reserve(num_of_class[i]);
   for (size_t node = 0; node < nodes_.size(); ++node) {
     for (const ClassMatch& match : of_node_[node])
       of_class_[match.i].push_back({static_cast<int32_t>(node), match.probability});
   }
-}
-
-LandmarkOrder PromiseMaker::Order(std::vector<size_t> pool, std::vector<size_t> first) const {
-  LandmarkOrderOptions options;
-  options.first = std::move(first);
-  return {classes_, model_.OfViews(num_threads_), std::move(pool), options, num_threads_};
 }
 
 PromiseBasis PromiseMaker::BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options) {
@@ -85,12 +91,11 @@ std::vector<char> PromiseMaker::Complete(const std::vector<size_t>& first, const
 Promises PromiseMaker::Promise(const std::vector<char>& keep, const PromiseBasis& basis,
                                const PromiseOptions& options, const DivideLike& divide) const {
   const PromiseModel& model = basis.model;
-  const ViewDistance& distance = model_.distance();
   Promises promises;
   promises.findings = {.terms = options.terms,
                        .model = model,
-                       .radius_m = distance.radius(),
-                       .radius_deg = distance.radius_deg(),
+                       .radius_m = distance_.radius(),
+                       .radius_deg = distance_.radius_deg(),
                        .left_out = basis.left_out};
   const std::vector<char> all(keep.size(), 1);
   promises.findings.nodes.resize(nodes_.size());
@@ -98,7 +103,7 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const PromiseBasis
     const double focal = sights_.FocalOf(classes_.images[nodes_[node].image].image_id);
     const auto expect = [&](const std::vector<char>& these) {
       return ExpectationOf(sights_, of_node_[node], these, nodes_[node].cam_from_world, focal,
-                           distance.depth());
+                           distance_.depth());
     };
     const Expectation expected = expect(keep), most = expect(all);
     promises.findings.nodes[node] = {.image = nodes_[node].image,
@@ -133,21 +138,19 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const PromiseBasis
   if (divide) likewise = divide(nodes_, problem, cover_bound);
   const PromiseRegions divided = likewise
                                      ? *std::move(likewise)
-                                     : DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem,
-                                                   keep, options.max_region_landmarks, cover_bound);
+                                     : DivideNodes(nodes_, distance_.radius(), distance_.radius_deg(),
+                                                   problem, keep, options.max_region_landmarks, cover_bound);
   promises.regions_lower_bound = divided.lower_bound;
   for (const PromiseRegion& region : divided.regions) {
     for (const int32_t node : region.nodes)
       promises.findings.nodes[node].region = static_cast<RegionIdx>(promises.regions.size());
     promises.regions.push_back({.images = {}, .classes = region.classes});
   }
+  std::vector<Pose> poses;
+  for (const PromiseNode& node : nodes_) poses.push_back(node.cam_from_world);
+  const ViewTree tree(poses, distance_.radius(), distance_.radius_deg());
   for (size_t image = 0; image < classes_.images.size(); ++image) {
-    size_t nearest = 0;
-    double least = 0;
-    for (size_t node = 0; node < nodes_.size(); ++node) {
-      const double squared = distance.Squared(nodes_[node].cam_from_world, image);
-      if (node == 0 || squared < least) least = squared, nearest = node;
-    }
+    const int32_t nearest = tree.Nearest(classes_.images[image].cam_from_world, 1).front();
     promises.regions[promises.findings.nodes[nearest].region].images.push_back(image);
   }
   for (const NodePromise& node : promises.findings.nodes) {

@@ -49,14 +49,15 @@ struct NodeDemand {
 using DivideLike = std::function<std::optional<PromiseRegions>(
     const std::vector<PromiseNode>& nodes, const CoverProblem& problem, int64_t cover_bound)>;
 
+// Of the classes at these positions, `first` before the others.
+LandmarkOrder OrderOf(const Classes& classes, const MatchModel& model, std::vector<size_t> pool,
+                      std::vector<size_t> first, int num_threads);
+
 // Makes promises about maps of a survey: at every node, with which probability a robot is localized.
 class PromiseMaker {
  public:
-  // `classes` must outlive it.
-  PromiseMaker(const Classes& classes, int num_threads);
-
-  // Of the classes at these positions, `first` before the others.
-  LandmarkOrder Order(std::vector<size_t> pool, std::vector<size_t> first = {}) const;
+  // `model`: of these classes, which must outlive it.
+  PromiseMaker(const Classes& classes, const MatchModel& model, int num_threads);
 
   // `fared`: how left-out images fared in maps of parts of the survey.
   static PromiseBasis BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options);
@@ -77,7 +78,7 @@ class PromiseMaker {
  private:
   const Classes& classes_;
   int num_threads_;
-  MatchModel model_;
+  ViewDistance distance_;
   LandmarkSights sights_;
   std::vector<PromiseNode> nodes_;
   std::vector<std::vector<ClassMatch>> of_node_;

@@ -64,18 +64,21 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
     // The survey stays where it is: what is learnt from it refers to it.
     part.survey = std::make_unique<LeftOutSurvey>(std::move(left_out));
     const LeftOutSurvey& survey = *part.survey;
-    const MatchModel model(survey.classes, {}, threads);
     part.pool = PoolIn(survey, classes, may_keep);
-    part.matches.resize(survey.images.size());
-    ParallelFor(static_cast<int64_t>(part.matches.size()), threads, [&](int64_t i) {
-      part.matches[i] = model.At(survey.images[i].camera, survey.images[i].cam_from_world,
-                                 survey.images[i].session, MatchModel::Where::kThere);
-    });
+    ExpectedMatches of_views;
+    {
+      const MatchModel model(survey.classes, {}, threads);
+      std::vector<MatchModel::Look> looks;
+      for (const TrialImage& image : survey.images)
+        looks.push_back({&image.camera, image.cam_from_world, image.session});
+      part.matches = model.At(looks, MatchModel::Where::kThere, threads);
+      of_views = model.OfViews(threads);
+    }
+    part.depth = of_views.depth;
     LandmarkOrderOptions of_order;
     of_order.first = FirstIn(survey, classes, first);
-    part.order.emplace(survey.classes, model.OfViews(threads), part.pool, of_order, threads);
+    part.order.emplace(survey.classes, std::move(of_views), part.pool, of_order, threads);
     part.sights.emplace(survey.classes, KeypointErrors());
-    part.depth = model.distance().depth();
     progress.Advance();
     return Ok();
   }));

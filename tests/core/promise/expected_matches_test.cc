@@ -136,9 +136,9 @@ TEST(LearnMatches, WhatOneLightShowsIsHardlyExpectedInAnother) {
   const MatchModel model(classes, {}, 1);
   double expected[2][2] = {{0, 0}, {0, 0}};
   for (const int session : {0, 1}) {
-    for (const ClassMatch& match :
-         model.At(classes.cameras[0], classes.images[24].cam_from_world, session, MatchModel::Where::kNearby))
-      expected[session][match.i % 2] += match.probability;
+    const auto of_looks = model.At({{&classes.cameras[0], classes.images[24].cam_from_world, session}},
+                                   MatchModel::Where::kNearby, 1);
+    for (const ClassMatch& match : of_looks[0]) expected[session][match.i % 2] += match.probability;
   }
   EXPECT_GT(expected[0][0], 3 * expected[0][1]);
   EXPECT_GT(expected[1][1], 3 * expected[1][0]);
@@ -170,7 +170,8 @@ TEST(LearnMatches, WhatIsPerhapsGoneIsExpectedAsMuchLess) {
   const Camera& camera = classes.cameras[0];
   const auto expected = [&] {
     const MatchModel model(classes, {}, 1);
-    const auto of_image = model.At(camera, classes.images[12].cam_from_world, -1, MatchModel::Where::kThere);
+    const auto of_image =
+        model.At({{&camera, classes.images[12].cam_from_world, -1}}, MatchModel::Where::kThere, 1)[0];
     return std::pair(model.OfViews(1).of_class[7].at(0).probability, of_image.at(5).probability);
   };
   const auto certain = expected();

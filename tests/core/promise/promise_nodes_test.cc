@@ -89,7 +89,7 @@ TEST(ExpectationOf, CountsTheKeptAndStatesTheirAccuracy) {
   for (int i = 0; i < 20; ++i) AddClass({0.2 * (i % 5) - 0.4, 0.2 * (i / 5) - 0.3, 2}, {1, 2}, 1, &classes);
   const LandmarkSights sights(classes, {});
   std::vector<ClassMatch> matches;
-  for (size_t i = 0; i < 20; ++i) matches.push_back({i, 0.5F});
+  for (uint32_t i = 0; i < 20; ++i) matches.push_back({i, 0.5F});
   const Pose pose = classes.images[0].cam_from_world;
   const auto expect = [&](size_t num, double depth) {
     std::vector<char> keep(20, 0);
