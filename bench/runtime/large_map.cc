@@ -5,7 +5,11 @@
 //                                                  this many rooms surveyed again: other landmarks, and
 //                                                  fewer; with the tree of the map without new rooms, or a
 //                                                  new one
-//   large_map query MAP NUM_QUERIES BUDGET_MIB    opening time, memory, fixes; every query in another room
+//   large_map query MAP NUM_QUERIES BUDGET_MIB [IMAGE]
+//                                                  opening time, memory, fixes; every query in another room;
+//                                                  beside SIFT on an image
+#include <malloc.h>
+
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +18,11 @@
 #include <fstream>
 #include <string>
 
+#include <opencv2/features2d.hpp>
+
+#include "bench/runtime/fix_figures.h"
+#include "core/features/sift.h"
+#include "core/images/image_file.h"
 #include "core/seal/map_seal.h"
 #include "core/vocabulary/grow_vocabulary.h"
 #include "runtime/localize/localizer.h"
@@ -141,7 +150,55 @@ double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-Status Ask(const std::string& path, int num_queries, int64_t budget_mib) {
+// What an image's features cost, in the same run as the queries: processor milliseconds.
+class SiftTimes {
+ public:
+  explicit SiftTimes(cv::Mat grey) : grey_(std::move(grey)) {}
+
+  Status Measure() {
+    std::vector<cv::KeyPoint> keypoints;
+    cv::Mat descriptors;
+    const double before = CpuSeconds();
+    opencv_->detectAndCompute(grey_, {}, keypoints, descriptors);
+    const double middle = CpuSeconds();
+    CAIRN_ASSIGN_OR_RETURN(const Features features, ExtractSift(grey_, {}));
+    ours_ms_.push_back(1000 * (CpuSeconds() - middle));
+    opencv_ms_.push_back(1000 * (middle - before));
+    num_features_ = features.keypoints.size();
+    return Ok();
+  }
+
+  void Print(double query_ms) const {
+    const double opencv_ms = QuantileOf(opencv_ms_, 0.5), ours_ms = QuantileOf(ours_ms_, 0.5);
+    std::printf(
+        "SIFT of the image (%zu features): OpenCV %.1f ms, ours %.1f ms; with a query's %.1f ms: %.2f times "
+        "OpenCV's SIFT\n",
+        num_features_, opencv_ms, ours_ms, query_ms, (ours_ms + query_ms) / opencv_ms);
+  }
+
+ private:
+  const cv::Mat grey_;
+  const cv::Ptr<cv::SIFT> opencv_ =
+      cv::SIFT::create(SiftOptions().max_num_features, 3, SiftOptions().contrast_threshold,
+                       SiftOptions().edge_threshold, 1.6, CV_32F);
+  std::vector<double> opencv_ms_, ours_ms_;
+  size_t num_features_ = 0;
+};
+
+constexpr int kNumSiftTimes = 50;
+// As an image has many features that are none of the map.
+constexpr int kNumOutliers = 1700;
+
+Status Ask(const std::string& path, int num_queries, int64_t budget_mib, const std::string& image_path) {
+  cv::setNumThreads(1);
+  // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  std::optional<SiftTimes> sift;
+  if (!image_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(cv::Mat grey, ReadGreyImage(image_path));
+    sift.emplace(std::move(grey));
+  }
   CAIRN_ASSIGN_OR_RETURN(const PublicKey key, ReadPublicKey(path + ".key.pub"));
   const double before = ResidentMib();
   const auto start = std::chrono::steady_clock::now();
@@ -159,16 +216,21 @@ Status Ask(const std::string& path, int num_queries, int64_t budget_mib) {
   Localizer localizer(map);
   Random random(7);
   int num_fixes = 0, num_wrong = 0;
-  double sum_ms = 0;
+  double sum_ms = 0, num_features = 0;
+  std::vector<double> query_ms;
   for (int i = 0; i < num_queries; ++i) {
     const int number = static_cast<int>(random.UniformInt(0, num_rooms - 1));
     const Pose truth = RoomPose(number, random.Uniform(-3, 3), random.Uniform(-2, 2), random.Uniform(0, 360));
     const SyntheticRoom room = MakeRoom(number);
-    Features features = RenderFeatures(room, truth, {}, i);
+    Features features = RenderFeatures(room, truth, {.num_outliers = kNumOutliers}, i);
+    num_features += static_cast<double>(features.keypoints.size());
+    if (sift && i % std::max(1, num_queries / kNumSiftTimes) == 0) CAIRN_RETURN_IF_ERROR(sift->Measure());
     const auto begin = std::chrono::steady_clock::now();
+    const double cpu_begin = CpuSeconds();
     CAIRN_ASSIGN_OR_RETURN(const Localization found,
                            localizer.LocalizeFeatures(std::move(features), room.camera));
     sum_ms += MillisecondsSince(begin);
+    query_ms.push_back(1000 * (CpuSeconds() - cpu_begin));
     num_fixes += found.has_fix() ? 1 : 0;
     num_wrong += found.has_fix() && CenterErrorM(found.cam_from_world, truth) > 0.5 ? 1 : 0;
     if (i == 0) std::printf("first fix %.1f ms after the start of opening\n", MillisecondsSince(start));
@@ -181,6 +243,9 @@ Status Ask(const std::string& path, int num_queries, int64_t budget_mib) {
       std::fflush(stdout);
     }
   }
+  std::printf("processor ms of a query with %.0f features: median %.1f, 90 %% %.1f\n",
+              num_features / num_queries, QuantileOf(query_ms, 0.5), QuantileOf(query_ms, 0.9));
+  if (sift) sift->Print(QuantileOf(query_ms, 0.5));
   return Ok();
 }
 
@@ -191,12 +256,13 @@ int main(int argc, char** argv) {
   const std::string verb = argc > 1 ? argv[1] : "";
   cairn::Status status = cairn::MakeError(cairn::ErrorCode::kInvalidArgument,
                                           "usage: large_map make MAP NUM_ROOMS [NUM_NEW same-tree|new-tree] "
-                                          "| large_map query MAP NUM BUDGET_MIB");
+                                          "| large_map query MAP NUM BUDGET_MIB [IMAGE]");
   if (verb == "make" && argc == 4) status = cairn::Make(argv[2], std::atoi(argv[3]), 0, false);
   if (verb == "make" && argc == 6)
     status =
         cairn::Make(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), std::string(argv[5]) == "same-tree");
-  if (verb == "query" && argc == 5) status = cairn::Ask(argv[2], std::atoi(argv[3]), std::atoi(argv[4]));
+  if (verb == "query" && (argc == 5 || argc == 6))
+    status = cairn::Ask(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), argc == 6 ? argv[5] : "");
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
   return status.ok() ? 0 : 1;
 }

@@ -120,13 +120,21 @@ class AmbiguitySearch {
   // likeliest remaining node; a place includes the nodes that show the same as its first one.  The remaining,
   // very unlikely nodes count as one place.
   std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
-    std::vector<NodeIdx> left = {node};
+    std::vector<NodeIdx> left = {node}, others;
+    for (NodeIdx other = 0; other < std::ssize(probabilities); ++other) {
+      if (other != node && probabilities[other] > 0) others.push_back(other);
+    }
+    // Few of many are wanted: a heap of them, ties to the smaller node.
+    const auto less_likely = [&](NodeIdx a, NodeIdx b) {
+      return std::pair(probabilities[a], b) < std::pair(probabilities[b], a);
+    };
+    std::make_heap(others.begin(), others.end(), less_likely);
     double rest = 1 - probabilities[node];
-    for (const NodeIdx other : BestFirst(probabilities)) {
-      if (rest < kNegligible || probabilities[other] <= 0) break;
-      if (other == node) continue;
-      left.push_back(other);
-      rest -= probabilities[other];
+    while (!others.empty() && rest >= kNegligible) {
+      std::pop_heap(others.begin(), others.end(), less_likely);
+      left.push_back(others.back());
+      rest -= probabilities[others.back()];
+      others.pop_back();
     }
     std::vector<double> places = {std::max(rest, 0.0)};
     while (!left.empty()) {
