@@ -190,12 +190,12 @@ constexpr int kNumSiftTimes = 50;
 constexpr int kNumOutliers = 1700;
 
 Status Ask(const std::string& path, int num_queries, int64_t budget_mib, const std::string& image_path) {
-  cv::setNumThreads(1);
-  // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
   std::optional<SiftTimes> sift;
   if (!image_path.empty()) {
+    cv::setNumThreads(1);
+    // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
+    mallopt(M_MMAP_THRESHOLD, 1 << 30);
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
     CAIRN_ASSIGN_OR_RETURN(cv::Mat grey, ReadGreyImage(image_path));
     sift.emplace(std::move(grey));
   }

@@ -40,8 +40,11 @@ for n in "${sizes[@]}"; do
       -o "$survey/world.db"
   stage "$n" decompose-regions "$survey/world.db" --classes "$survey/classes.db" --k 40 -o "$survey/regions.db"
   stage "$n" build-vocabulary "$survey/features.db" -o "$survey/vocabulary.db"
-  stage "$n" emit-map --classes "$survey/classes.db" --world "$survey/world.db" --regions "$survey/regions.db" \
-      --vocabulary "$survey/vocabulary.db" --name building --landmarks regions -o "$survey/map.cairn"
+  stage "$n" link-appearance "$survey/matches.db" "$survey/vocabulary.db" --capture "$survey" --classes "$survey/classes.db" \
+      -o "$survey/appearance.db"
+  stage "$n" emit-map --matches "$survey/matches.db" --classes "$survey/classes.db" --world "$survey/world.db" \
+      --regions "$survey/regions.db" --vocabulary "$survey/vocabulary.db" --appearance "$survey/appearance.db" --name building \
+      -o "$survey/map.cairn"
 done
 
 awk -F '\t' -v sizes="${sizes[*]}" '

@@ -21,7 +21,7 @@ void BlobWriter::Bytes(const uint8_t* bytes, size_t num_bytes) {
   bytes_.append(reinterpret_cast<const char*>(bytes), num_bytes);
 }
 
-uint64_t BlobReader::Varint() {
+uint64_t BlobReader::LongVarint() {
   uint64_t value = 0;
   for (int shift = 0; ok_ && shift < 63; shift += 7) {
     if (position_ == bytes_.size()) break;

@@ -23,6 +23,7 @@ class BlobWriter {
   void Bytes(std::string_view bytes) { bytes_.append(bytes); }
   // The text up to its first zero byte, and a zero byte.
   void ZeroTerminated(const std::string& text) { bytes_.append(text.c_str()).push_back('\0'); }
+  size_t num_bytes() const { return bytes_.size(); }
   std::string Take() { return std::move(bytes_); }
 
  private:
@@ -37,7 +38,12 @@ class BlobReader {
  public:
   explicit BlobReader(std::string_view bytes) : bytes_(bytes) {}
 
-  uint64_t Varint();
+  uint64_t Varint() {
+    // Most are short.
+    if (ok_ && position_ < bytes_.size() && static_cast<uint8_t>(bytes_[position_]) < 0x80)
+      return static_cast<uint8_t>(bytes_[position_++]);
+    return LongVarint();
+  }
   uint8_t UInt8() { return static_cast<uint8_t>(LittleEndian(1)); }
   uint32_t UInt32() { return static_cast<uint32_t>(LittleEndian(4)); }
   uint64_t UInt64() { return LittleEndian(8); }
@@ -55,6 +61,7 @@ class BlobReader {
   bool Finished() const { return ok_ && position_ == bytes_.size(); }
 
  private:
+  uint64_t LongVarint();
   uint64_t LittleEndian(int num_bytes);
 
   std::string_view bytes_;

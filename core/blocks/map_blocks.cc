@@ -195,46 +195,57 @@ Result<RegionBlock> DecodeRegionBlock(std::string_view bytes, const BlockEntry& 
   return block;
 }
 
-std::string EncodeBlock(const WordBlock& block) {
+std::vector<Posting> WordBlock::Postings(size_t i) const {
+  std::vector<Posting> postings;
+  postings.reserve(NumPostings(i));
+  ForPostings(i, [&](const Posting& posting) { postings.push_back(posting); });
+  return postings;
+}
+
+WordBlock MakeWordBlock(WordIdx first, const std::vector<std::vector<Posting>>& postings) {
+  WordBlock block{.first = first, .bytes = {}, .begins = {}};
   BlobWriter writer;
-  for (const std::vector<Posting>& postings : block.postings) {
-    writer.Varint(postings.size());
+  for (const std::vector<Posting>& of_word : postings) {
+    block.begins.push_back(static_cast<uint32_t>(writer.num_bytes()));
+    writer.Varint(of_word.size());
     int64_t document = -1;
-    for (const Posting& posting : postings) {
+    for (const Posting& posting : of_word) {
       // Most words occur once in a document.
       writer.Varint(2 * static_cast<uint64_t>(posting.document - document - 1) + (posting.count > 1 ? 1 : 0));
       if (posting.count > 1) writer.Varint(static_cast<uint64_t>(posting.count - 2));
       document = posting.document;
     }
   }
-  return writer.Take();
+  block.bytes = writer.Take();
+  return block;
 }
+
+std::string EncodeBlock(const WordBlock& block) { return block.bytes; }
 
 Result<WordBlock> DecodeWordBlock(std::string_view bytes, const BlockEntry& entry,
                                   const MapDirectory& directory, const std::string& what) {
   BlobReader reader(bytes);
-  WordBlock block;
-  block.first = static_cast<WordIdx>(entry.first);
+  WordBlock block{.first = static_cast<WordIdx>(entry.first), .bytes = {}, .begins = {}};
   const auto num_images = static_cast<uint64_t>(directory.Count(BlockKind::kImages));
   for (uint32_t i = 0; i < entry.count; ++i) {
-    const Error corrupt =
-        MakeError(ErrorCode::kCorrupt, "{}: word {}: its postings are not ascending images below {}", what,
-                  entry.first + i, num_images);
+    const auto corrupt = [&] {
+      return MakeError(ErrorCode::kCorrupt, "{}: word {}: its postings are not ascending images below {}",
+                       what, entry.first + i, num_images);
+    };
+    block.begins.push_back(static_cast<uint32_t>(bytes.size() - reader.num_left()));
     const uint64_t num_postings = reader.Varint();
-    if (num_postings > reader.num_left()) return corrupt;
-    std::vector<Posting>& postings = block.postings.emplace_back();
+    if (num_postings > reader.num_left()) return corrupt();
     int64_t document = -1;
     for (uint64_t k = 0; k < num_postings; ++k) {
       const uint64_t head = reader.Varint();
       const uint64_t more = head % 2 == 1 ? reader.Varint() : 0;
-      if (head / 2 >= num_images || more > std::numeric_limits<int32_t>::max() - 2) return corrupt;
+      if (head / 2 >= num_images || more > std::numeric_limits<int32_t>::max() - 2) return corrupt();
       document += static_cast<int64_t>(head / 2) + 1;
-      if (document >= static_cast<int64_t>(num_images)) return corrupt;
-      postings.push_back(
-          {static_cast<int32_t>(document), head % 2 == 1 ? static_cast<int32_t>(more) + 2 : 1});
+      if (document >= static_cast<int64_t>(num_images)) return corrupt();
     }
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} words", entry.count);
+  block.bytes = bytes;
   return block;
 }
 
@@ -316,7 +327,10 @@ int64_t NumBytes(const StationBlock& block) {
 
 int64_t NumBytes(const RegionBlock& block) { return ListBytes(block.landmark_blocks); }
 
-int64_t NumBytes(const WordBlock& block) { return ListBytes(block.postings); }
+int64_t NumBytes(const WordBlock& block) {
+  return static_cast<int64_t>(sizeof(block) + block.bytes.capacity() +
+                              block.begins.capacity() * sizeof(uint32_t));
+}
 
 int64_t NumBytes(const Vocabulary& vocabulary) {
   return static_cast<int64_t>(vocabulary.nodes.size() * sizeof(VocabularyNode)) + vocabulary.centres.size() +

@@ -117,10 +117,45 @@ struct RegionBlock {
   std::vector<std::vector<int32_t>> landmark_blocks;  // per region, ordinals, ascending
 };
 
+// The postings of words as they are stored, documents are images: a query reads those of few words of a
+// block.
 struct WordBlock {
   WordIdx first = 0;
-  std::vector<std::vector<Posting>> postings;  // per word; documents are images
+  // Per word the number of postings, and of each the step from the image before and the count; all varints,
+  // and known to be right.
+  std::string bytes;
+  std::vector<uint32_t> begins;  // per word: where it begins in `bytes`
+
+  size_t NumPostings(size_t i) const {
+    const char* at = bytes.data() + begins[i];
+    return NextVarint(&at);
+  }
+  // Calls visit(posting) for those of the i-th word, ascending.
+  template <typename Visit>
+  void ForPostings(size_t i, const Visit& visit) const {
+    const char* at = bytes.data() + begins[i];
+    int64_t document = -1;
+    for (uint64_t num_left = NextVarint(&at); num_left > 0; --num_left) {
+      const uint64_t head = NextVarint(&at);
+      document += static_cast<int64_t>(head / 2) + 1;
+      const int32_t count = head % 2 == 1 ? static_cast<int32_t>(NextVarint(&at)) + 2 : 1;
+      visit(Posting{static_cast<int32_t>(document), count});
+    }
+  }
+  std::vector<Posting> Postings(size_t i) const;
+
+ private:
+  static uint64_t NextVarint(const char** at) {
+    uint64_t value = 0;
+    for (int shift = 0;; shift += 7) {
+      const auto byte = static_cast<uint8_t>(*(*at)++);
+      value |= static_cast<uint64_t>(byte & 0x7f) << shift;
+      if (byte < 0x80) return value;
+    }
+  }
 };
+// `postings`: per word, ascending images, counts of at least 1.
+WordBlock MakeWordBlock(WordIdx first, const std::vector<std::vector<Posting>>& postings);
 
 struct AppearanceBlock {
   int32_t first = 0;  // index of the first node

@@ -14,6 +14,9 @@ constexpr size_t kStationsPerBlock = 1024;
 constexpr size_t kRegionsPerBlock = 1024;
 constexpr size_t kWordsPerBlock = 1024;
 constexpr size_t kPostingsPerBlock = 4096;
+// A query reads most words of a small map, and few of those of one that has more postings than this.
+constexpr size_t kManyPostings = size_t{1} << 22;
+constexpr size_t kPostingsPerBlockOfMany = 1024;
 constexpr size_t kAppearanceNodesPerBlock = 1024;
 constexpr FaceIdx kViewRegionsPerBlock = 4096;
 constexpr size_t kLandmarkModelsPerBlock = 256;
@@ -76,11 +79,13 @@ void MapLayout::CutEvenly(BlockKind kind, size_t count, size_t size) {
 
 void MapLayout::CutWords() {
   const auto& files = rows_.vocabulary.inverted_files;
+  size_t total = 0;
+  for (const std::vector<Posting>& postings : files) total += postings.size();
+  const size_t per_block = total > kManyPostings ? kPostingsPerBlockOfMany : kPostingsPerBlock;
   size_t first = 0, num_postings = 0;
   for (size_t word = 0; word < files.size(); ++word) {
     num_postings += files[word].size();
-    if (num_postings < kPostingsPerBlock && word + 1 - first < kWordsPerBlock && word + 1 < files.size())
-      continue;
+    if (num_postings < per_block && word + 1 - first < kWordsPerBlock && word + 1 < files.size()) continue;
     AddEntry(BlockKind::kWords, first, word + 1 - first);
     first = word + 1;
     num_postings = 0;
@@ -179,11 +184,11 @@ RegionBlock MapLayout::MakeRegionBlock(const BlockEntry& entry) const {
 
 WordBlock MapLayout::MakeWordBlock(const BlockEntry& entry) const {
   const auto begin = rows_.vocabulary.inverted_files.begin() + entry.first;
-  WordBlock block{static_cast<WordIdx>(entry.first), {begin, begin + entry.count}};
-  for (std::vector<Posting>& postings : block.postings) {
-    for (Posting& posting : postings) posting.document = image_of_document_[posting.document];
+  std::vector<std::vector<Posting>> postings(begin, begin + entry.count);
+  for (std::vector<Posting>& of_word : postings) {
+    for (Posting& posting : of_word) posting.document = image_of_document_[posting.document];
   }
-  return block;
+  return cairn::MakeWordBlock(static_cast<WordIdx>(entry.first), postings);
 }
 
 AppearanceBlock MapLayout::MakeAppearanceBlock(const BlockEntry& entry) const {

@@ -49,12 +49,12 @@ class RowsReader {
       case BlockKind::kDocumentNorms:  // follow from the words
         return Take(DecodeDocumentNorms(bytes, entry, what), [](const std::vector<float>&) { return Ok(); });
       case BlockKind::kWords:
-        return Take(DecodeWordBlock(bytes, entry, directory, what), [&](WordBlock words) -> Status {
+        return Take(DecodeWordBlock(bytes, entry, directory, what), [&](const WordBlock& words) -> Status {
           // The tree comes before the words.
           if (rows_.vocabulary.nodes.empty())
             return MakeError(ErrorCode::kCorrupt, "{}: words without a tree", what);
-          std::move(words.postings.begin(), words.postings.end(),
-                    rows_.vocabulary.inverted_files.begin() + words.first);
+          for (size_t i = 0; i < words.begins.size(); ++i)
+            rows_.vocabulary.inverted_files[words.first + i] = words.Postings(i);
           return Ok();
         });
       case BlockKind::kImages:

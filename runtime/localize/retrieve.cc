@@ -100,17 +100,19 @@ Result<PooledVector<Candidate>> RetrieveByVocabulary(const Map& map, const Query
   for (size_t begin = 0, end = 0; begin < words.size(); begin = end) {
     const WordIdx word = words[begin];
     while (end < words.size() && words[end] == word) ++end;
-    if (!block || word >= block->first + static_cast<int64_t>(block->postings.size())) {
+    if (!block || word >= block->first + static_cast<int64_t>(block->begins.size())) {
       CAIRN_ASSIGN_OR_RETURN(block, map.Words(map.directory().OrdinalOf(BlockKind::kWords, word)));
     }
-    std::span<const Posting> postings = block->postings[word - block->first];
-    if (postings.empty()) continue;
-    if (!Spend(query.work.get(), Work::kPosting, postings.size())) return PooledVector<Candidate>();
+    const size_t num_postings = block->NumPostings(word - block->first);
+    if (num_postings == 0) continue;
+    if (!Spend(query.work.get(), Work::kPosting, num_postings)) return PooledVector<Candidate>();
     // [Mariottini11 §IV] the query vector's entry, a word's count times its inverse document frequency
-    const double idf = std::log(documents.count / static_cast<double>(postings.size()));
+    const double idf = std::log(documents.count / static_cast<double>(num_postings));
     const double query_weight = static_cast<double>(end - begin) * idf;
     squared_norm += query_weight * query_weight;
-    for (const Posting& posting : postings) dots[posting.document] += query_weight * idf * posting.count;
+    block->ForPostings(word - block->first, [&](const Posting& posting) {
+      dots[posting.document] += query_weight * idf * posting.count;
+    });
   }
   return BestImages(
       dots, std::sqrt(squared_norm), [&](size_t image) { return (*norms)[image]; }, options);

@@ -2,7 +2,16 @@
 
 #include <utility>
 
+#include "core/line/memory.h"
+
 namespace cairn {
+namespace {
+
+// What is dropped leaves holes in the C library's memory, which it keeps: they are given back whenever so
+// much was dropped.
+constexpr int64_t kDroppedBytes = int64_t{16} << 20;
+
+}  // namespace
 
 std::shared_ptr<const void> BlockCache::Find(int64_t key) {
   const std::lock_guard lock(mutex_);
@@ -14,7 +23,7 @@ std::shared_ptr<const void> BlockCache::Find(int64_t key) {
 
 std::shared_ptr<const void> BlockCache::Insert(int64_t key, std::shared_ptr<const void> block,
                                                int64_t num_bytes) {
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (const auto found = index_.find(key); found != index_.end()) return found->second->block;
   entries_.push_front({key, std::move(block), num_bytes});
   index_[key] = entries_.begin();
@@ -23,8 +32,14 @@ std::shared_ptr<const void> BlockCache::Insert(int64_t key, std::shared_ptr<cons
   std::shared_ptr<const void> inserted = entries_.front().block;
   while (num_bytes_ > budget_bytes_ && !entries_.empty()) {
     num_bytes_ -= entries_.back().num_bytes;
+    num_dropped_bytes_ += entries_.back().num_bytes;
     index_.erase(entries_.back().key);
     entries_.pop_back();
+  }
+  if (num_dropped_bytes_ >= kDroppedBytes) {
+    num_dropped_bytes_ = 0;
+    lock.unlock();
+    ReturnFreedMemory();
   }
   return inserted;
 }

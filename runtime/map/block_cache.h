@@ -36,6 +36,7 @@ class BlockCache {
   std::list<Entry> entries_;  // most recently used first
   std::unordered_map<int64_t, std::list<Entry>::iterator> index_;
   int64_t num_bytes_ = 0;
+  int64_t num_dropped_bytes_ = 0;  // since freed memory was given back
   int64_t num_loads_ = 0;
 };
 

@@ -9,6 +9,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
+#include "core/structure/points.h"
 
 namespace cairn::link_appearance {
 namespace {
@@ -35,6 +36,22 @@ struct NodeScores {
   double least_best = std::numeric_limits<double>::infinity();
 };
 
+constexpr double kLeastDistance = 1e-6;
+
+Eigen::Vector3d OnFloor(const FloorPose& place) { return {place.position.x(), place.position.y(), 0}; }
+
+// Where the nodes stand that have a place; `nodes`: which these are.
+std::vector<Eigen::Vector3d> PlacesOnFloor(const std::vector<std::optional<FloorPose>>& places,
+                                           std::vector<NodeIdx>* nodes) {
+  std::vector<Eigen::Vector3d> on_floor;
+  for (size_t node = 0; node < places.size(); ++node) {
+    if (!places[node]) continue;
+    nodes->push_back(static_cast<NodeIdx>(node));
+    on_floor.push_back(OnFloor(*places[node]));
+  }
+  return on_floor;
+}
+
 class AmbiguitySearch {
  public:
   AmbiguitySearch(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
@@ -47,7 +64,9 @@ class AmbiguitySearch {
         appearance_(appearance),
         bags_(DocumentWords(vocabulary)),
         node_of_document_(vocabulary.document_ids.size(), -1),
-        documents_(appearance.nodes.size()) {
+        documents_(appearance.nodes.size()),
+        on_floor_(PlacesOnFloor(places, &nodes_on_floor_)),
+        near_(on_floor_, std::max(options.confusable_distance_m, kLeastDistance)) {
     std::unordered_map<ImageId, NodeIdx> node_of_image;
     for (size_t node = 0; node < appearance.nodes.size(); ++node) {
       for (const ImageId image : appearance.nodes[node].images)
@@ -120,34 +139,47 @@ class AmbiguitySearch {
   // likeliest remaining node; a place includes the nodes that show the same as its first one.  The remaining,
   // very unlikely nodes count as one place.
   std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
-    std::vector<NodeIdx> left = {node}, others;
+    std::vector<std::pair<double, NodeIdx>> others;  // and their probabilities, the likeliest first
     for (NodeIdx other = 0; other < std::ssize(probabilities); ++other) {
-      if (other != node && probabilities[other] > 0) others.push_back(other);
+      if (other != node && probabilities[other] > 0) others.emplace_back(probabilities[other], other);
     }
-    // Few of many are wanted: a heap of them, ties to the smaller node.
-    const auto less_likely = [&](NodeIdx a, NodeIdx b) {
-      return std::pair(probabilities[a], b) < std::pair(probabilities[b], a);
-    };
-    std::make_heap(others.begin(), others.end(), less_likely);
+    std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    std::vector<char> is_left(probabilities.size(), 0);
+    is_left[node] = 1;
     double rest = 1 - probabilities[node];
-    while (!others.empty() && rest >= kNegligible) {
-      std::pop_heap(others.begin(), others.end(), less_likely);
-      left.push_back(others.back());
-      rest -= probabilities[others.back()];
-      others.pop_back();
+    size_t num_others = 0;
+    for (; num_others < others.size() && rest >= kNegligible; ++num_others) {
+      is_left[others[num_others].second] = 1;
+      rest -= others[num_others].first;
     }
     std::vector<double> places = {std::max(rest, 0.0)};
-    while (!left.empty()) {
-      const NodeIdx first = left.front();
+    const auto add_place = [&](NodeIdx first) {
+      if (is_left[first] == 0) return;
       double sum = 0;
-      std::erase_if(left, [&](NodeIdx other) {
-        const bool is_same = ShowTheSame(first, other);
-        if (is_same) sum += probabilities[other];
-        return is_same;
+      ForTheSame(first, [&](NodeIdx other) {
+        if (is_left[other] != 0) sum += probabilities[other];
+        is_left[other] = 0;
       });
       places.push_back(sum);
-    }
+    };
+    add_place(node);
+    for (size_t i = 0; i < num_others; ++i) add_place(others[i].second);
     return places;
+  }
+
+  // Calls visit(other) for the nodes that ShowTheSame as this one, itself first; for some twice.
+  template <typename Visit>
+  void ForTheSame(NodeIdx node, const Visit& visit) const {
+    visit(node);
+    for (const AppearanceGraph::Neighbour& neighbour : appearance_.graph.Neighbours(node))
+      visit(neighbour.node);
+    if (places_.empty() || !places_[node]) return;
+    near_.ForNear(OnFloor(*places_[node]), [&](int place, double distance) {
+      const NodeIdx other = nodes_on_floor_[place];
+      if (distance < options_.confusable_distance_m && !OnlyLookAlike(node, other)) visit(other);
+    });
   }
 
   bool OnlyLookAlike(NodeIdx a, NodeIdx b) const {
@@ -192,6 +224,9 @@ class AmbiguitySearch {
   std::vector<BagOfWords> bags_;
   std::vector<NodeIdx> node_of_document_;        // -1: of none
   std::vector<std::vector<int32_t>> documents_;  // per node
+  std::vector<NodeIdx> nodes_on_floor_;          // those that have a place
+  std::vector<Eigen::Vector3d> on_floor_;        // where they stand
+  PointGrid near_;                               // of on_floor_
 };
 
 }  // namespace

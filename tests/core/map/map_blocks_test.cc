@@ -258,9 +258,12 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
         EXPECT_FALSE(blocks.Decode(i, EncodeBlock(models)).ok());
       }
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
-      WordBlock words = layout.MakeWordBlock(entry);
-      words.postings[0].back().document = 3;
-      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(words)).ok());
+      const WordBlock words = layout.MakeWordBlock(entry);
+      std::vector<std::vector<Posting>> postings;
+      for (size_t word = 0; word < words.begins.size(); ++word) postings.push_back(words.Postings(word));
+      EXPECT_EQ(MakeWordBlock(words.first, postings).bytes, words.bytes);
+      postings[0].back().document = 3;
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(MakeWordBlock(words.first, postings))).ok());
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kStations)) {
       StationBlock stations = layout.MakeStationBlock(entry);
       stations.neighbours[2] = {1};
