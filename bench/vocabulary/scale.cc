@@ -115,7 +115,7 @@ void PrintBytes(const Vocabulary& vocabulary) {
   int64_t num_postings = 0, word_bytes = 0;
   for (int word = 0; word < vocabulary.num_words(); ++word) {
     num_postings += static_cast<int64_t>(vocabulary.inverted_files[word].size());
-    word_bytes += static_cast<int64_t>(MakeWordBlock(word, {vocabulary.inverted_files[word]}).bytes.size());
+    word_bytes += static_cast<int64_t>(PackWords(word, {vocabulary.inverted_files[word]}).bytes.size());
   }
   const auto per_posting = [&](int64_t bytes) {
     return static_cast<double>(bytes) / static_cast<double>(num_postings);

@@ -202,7 +202,7 @@ std::vector<Posting> WordBlock::Postings(size_t i) const {
   return postings;
 }
 
-WordBlock MakeWordBlock(WordIdx first, const std::vector<std::vector<Posting>>& postings) {
+WordBlock PackWords(WordIdx first, const std::vector<std::vector<Posting>>& postings) {
   WordBlock block{.first = first, .bytes = {}, .begins = {}};
   BlobWriter writer;
   for (const std::vector<Posting>& of_word : postings) {

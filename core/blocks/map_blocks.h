@@ -122,7 +122,7 @@ struct RegionBlock {
 struct WordBlock {
   WordIdx first = 0;
   // Per word the number of postings, and of each the step from the image before and the count; all varints,
-  // and known to be right.
+  // and known to be right: of PackWords or DecodeWordBlock.
   std::string bytes;
   std::vector<uint32_t> begins;  // per word: where it begins in `bytes`
 
@@ -155,7 +155,7 @@ struct WordBlock {
   }
 };
 // `postings`: per word, ascending images, counts of at least 1.
-WordBlock MakeWordBlock(WordIdx first, const std::vector<std::vector<Posting>>& postings);
+WordBlock PackWords(WordIdx first, const std::vector<std::vector<Posting>>& postings);
 
 struct AppearanceBlock {
   int32_t first = 0;  // index of the first node

@@ -188,7 +188,7 @@ WordBlock MapLayout::MakeWordBlock(const BlockEntry& entry) const {
   for (std::vector<Posting>& of_word : postings) {
     for (Posting& posting : of_word) posting.document = image_of_document_[posting.document];
   }
-  return cairn::MakeWordBlock(static_cast<WordIdx>(entry.first), postings);
+  return PackWords(static_cast<WordIdx>(entry.first), postings);
 }
 
 AppearanceBlock MapLayout::MakeAppearanceBlock(const BlockEntry& entry) const {

@@ -47,21 +47,14 @@ constexpr double kAngleUnitDeg = 20;
 constexpr double kOctavesUnit = 0.5;
 // An image taken anywhere may find what this many of the survey's images nearest to it saw.
 constexpr size_t kMaxNumNearest = 32;
-// From there on sights weigh nothing: WeightAt is less than kLeastWeight.
-constexpr double kMostSquared = 42;
-// Bodies of ParallelFor that need room for each image take so many classes, images or poses at a time.
-constexpr int64_t kAtOnce = 256;
+// Bodies that need room for each image take so many classes, images or looks at a time.
+constexpr int64_t kClassesAtOnce = 256, kImagesAtOnce = 32, kLooksAtOnce = 16;
 
 // Of a sight from a view at this square of a distance.
 double WeightAt(double squared) { return std::exp(-squared / (2 * kKernelWidth * kKernelWidth)); }
 
-// Calls body(first, last) for ranges of [0, num).
-template <class Body>
-void ForRanges(size_t num, int num_threads, const Body& body) {
-  const auto count = static_cast<int64_t>(num);
-  ParallelFor((count + kAtOnce - 1) / kAtOnce, num_threads,
-              [&](int64_t range) { body(range * kAtOnce, std::min(count, (range + 1) * kAtOnce)); });
-}
+// From there on sights weigh less than kLeastWeight: sessions and presence only make weights less.
+const double kMostSquared = -2.01 * kKernelWidth * kKernelWidth * std::log(kLeastWeight);
 
 struct View {
   Pose cam_from_world;
@@ -95,7 +88,8 @@ class Learner {
         seen_in_[image->second].push_back(static_cast<uint32_t>(i));
       }
     }
-    ForRanges(views_.size(), num_threads, [&](int64_t first, int64_t last) { FindNear(first, last); });
+    ParallelForRuns(static_cast<int64_t>(views_.size()), kImagesAtOnce, num_threads,
+                    [&](int64_t first, int64_t last) { FindNear(first, last); });
     if (views_.size() > kMaxImagesInTable) return;
     weights_.resize(views_.size() * views_.size());
     ParallelFor(static_cast<int64_t>(views_.size()), num_threads, [&](int64_t a) {
@@ -329,10 +323,12 @@ class MatchModel::Impl {
   Impl(const Classes& classes, const ViewOptions& options, int num_threads)
       : classes_(classes), learner_(classes, options, num_threads), lookers_(classes.classes.size()) {
     const auto num_classes = static_cast<int64_t>(lookers_.size());
-    ForRanges(lookers_.size(), num_threads, [&](int64_t first, int64_t last) {
-      std::vector<char> is_candidate(classes.images.size(), 0);
-      for (int64_t i = first; i < last; ++i) lookers_[i] = learner_.LookersOf(i, &is_candidate);
-    });
+    ParallelForRuns(static_cast<int64_t>(lookers_.size()), kClassesAtOnce, num_threads,
+                    [&](int64_t first, int64_t last) {
+                      std::vector<char> is_candidate(classes.images.size(), 0);
+                      for (int64_t i = first; i < last; ++i)
+                        lookers_[i] = learner_.LookersOf(i, &is_candidate);
+                    });
     int64_t num_looking = 0, num_seen = 0;
     for (int64_t i = 0; i < num_classes; ++i) {
       num_looking += static_cast<int64_t>(lookers_[i].images.size());
@@ -390,10 +386,11 @@ class MatchModel::Impl {
   std::vector<std::vector<ClassMatch>> At(const std::vector<Look>& looks, Where where,
                                           int num_threads) const {
     std::vector<std::vector<ClassMatch>> matches(looks.size());
-    ForRanges(looks.size(), num_threads, [&](int64_t first, int64_t last) {
-      std::vector<double> weights(classes_.images.size(), kUnknown);
-      for (int64_t n = first; n < last; ++n) matches[n] = AtOne(looks[n], where, &weights);
-    });
+    ParallelForRuns(static_cast<int64_t>(looks.size()), kLooksAtOnce, num_threads,
+                    [&](int64_t first, int64_t last) {
+                      std::vector<double> weights(classes_.images.size(), kUnknown);
+                      for (int64_t n = first; n < last; ++n) matches[n] = AtOne(looks[n], where, &weights);
+                    });
     return matches;
   }
 

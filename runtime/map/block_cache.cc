@@ -32,7 +32,7 @@ std::shared_ptr<const void> BlockCache::Insert(int64_t key, std::shared_ptr<cons
   std::shared_ptr<const void> inserted = entries_.front().block;
   while (num_bytes_ > budget_bytes_ && !entries_.empty()) {
     num_bytes_ -= entries_.back().num_bytes;
-    num_dropped_bytes_ += entries_.back().num_bytes;
+    if (entries_.back().block.use_count() == 1) num_dropped_bytes_ += entries_.back().num_bytes;
     index_.erase(entries_.back().key);
     entries_.pop_back();
   }

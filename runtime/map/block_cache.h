@@ -9,7 +9,8 @@
 namespace cairn {
 
 // The loaded parts of a map, within a budget of bytes: the least recently used is dropped first.  A block
-// that somebody still holds stays alive until it is released.  May be used by several threads at once.
+// that somebody still holds stays alive until it is released.  What many dropped blocks took is given back to
+// the system.  May be used by several threads at once.
 class BlockCache {
  public:
   explicit BlockCache(int64_t budget_bytes) : budget_bytes_(budget_bytes) {}

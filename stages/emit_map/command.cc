@@ -371,6 +371,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
          "max_region_landmarks"},
         "is only read where landmarks is fewest or max_bytes is not 0; leave it out"));
   }
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForSurvey(is_by_trial ? "choosing the landmarks" : "making a map",
+                                             arguments.files, is_by_trial, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
   const DescriptorKind& kind = inputs.classes.descriptor_kind;
   if (!kind.is_sift() && arguments.options.descriptor_code == "transform") {

@@ -1,6 +1,18 @@
 #include "stages/emit_map/survey_files.h"
 
+#include <algorithm>
+
+#include "core/line/memory.h"
+
 namespace cairn::emit_map {
+namespace {
+
+// Bytes of memory per byte of the classes (bench/scale/README.md), and beside them what does not grow for
+// ever: sights that are kept (LandmarkOrderOptions).
+constexpr double kMemoryPerFileByte = 2, kMemoryPerFileByteOfTrials = 7, kMemoryPerFileByteOfSights = 6;
+constexpr double kMostMemoryOfSights = double{1 << 30};
+
+}  // namespace
 
 void AddSurveyFiles(const std::string& appearance_help, ArgumentParser& parser, SurveyFiles* files) {
   parser.Add("--classes", files->classes_path, "classes.db").Required().Type("classes.db");
@@ -8,6 +20,18 @@ void AddSurveyFiles(const std::string& appearance_help, ArgumentParser& parser, 
   parser.Add("--regions", files->regions_path, "regions.db").Required().Type("regions.db");
   parser.Add("--vocabulary", files->vocabulary_path, "vocabulary.db").Required().Type("vocabulary.db");
   parser.Add("--appearance", files->appearance_path, appearance_help).Type("appearance.db");
+}
+
+Status CheckMemoryForSurvey(const std::string& work, const SurveyFiles& files, bool by_trial,
+                            int64_t memory_mib) {
+  return CheckMemoryForFile(
+      work, files.classes_path,
+      [&](double file) {
+        if (!by_trial) return kMemoryPerFileByte * file;
+        return kMemoryPerFileByteOfTrials * file +
+               std::min(kMemoryPerFileByteOfSights * file, kMostMemoryOfSights);
+      },
+      memory_mib);
 }
 
 Result<SurveyData> ReadSurveyFiles(const SurveyFiles& files) {

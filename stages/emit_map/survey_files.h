@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "core/base/error.h"
@@ -28,6 +29,10 @@ struct SurveyData {
   SurveyParts parts;
   Vocabulary vocabulary;
 };
+// Refuses a survey that takes more memory than is allowed: `by_trial`: maps of parts of it are tried. Errors:
+// Failed.
+Status CheckMemoryForSurvey(const std::string& work, const SurveyFiles& files, bool by_trial,
+                            int64_t memory_mib);
 // Errors: those of the files' readers.
 Result<SurveyData> ReadSurveyFiles(const SurveyFiles& files);
 

@@ -36,8 +36,6 @@ struct NodeScores {
   double least_best = std::numeric_limits<double>::infinity();
 };
 
-constexpr double kLeastDistance = 1e-6;
-
 Eigen::Vector3d OnFloor(const FloorPose& place) { return {place.position.x(), place.position.y(), 0}; }
 
 // Where the nodes stand that have a place; `nodes`: which these are.
@@ -66,7 +64,7 @@ class AmbiguitySearch {
         node_of_document_(vocabulary.document_ids.size(), -1),
         documents_(appearance.nodes.size()),
         on_floor_(PlacesOnFloor(places, &nodes_on_floor_)),
-        near_(on_floor_, std::max(options.confusable_distance_m, kLeastDistance)) {
+        near_(on_floor_, options.confusable_distance_m) {
     std::unordered_map<ImageId, NodeIdx> node_of_image;
     for (size_t node = 0; node < appearance.nodes.size(); ++node) {
       for (const ImageId image : appearance.nodes[node].images)

@@ -18,7 +18,7 @@ constexpr int kNumThreads = 1;
 class ChooseAfterTest : public testing::Test {
  protected:
   void SetUp() override {
-    const PromiseMaker maker(classes_, kNumThreads);
+    const PromiseMaker maker(classes_, MatchModel(classes_, {}, kNumThreads), kNumThreads);
     // Half as many again as the promise takes, so that there is something to lose.
     std::vector<size_t> first;
     for (size_t i = 0; i < classes_.classes.size(); i += 5) first.push_back(i);

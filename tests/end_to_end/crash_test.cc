@@ -333,7 +333,7 @@ TEST(Clean, RemovesWhatCairnMadeAndNothingElse) {
   EXPECT_EQ(RunShell("cairn clean " + map).exit_code, 3);
 }
 
-// The small line's stages 1 to 5 by hand, from the files of a build to FOLDER/out.
+// The small line's stages by hand, from the files of a build to `out`.
 std::vector<std::string> StageCommands(const Workplace& workplace, const std::string& out) {
   const auto command = [&](const std::string& words, const std::string& stage) {
     return fmt::format("cairn {} --options {} -o {} --progress none --log-level error --threads 8", words,
@@ -348,7 +348,13 @@ std::vector<std::string> StageCommands(const Workplace& workplace, const std::st
           command("stage filter-visibility " + workplace.Build("classes.db"), "filter_visibility"),
           command("stage decompose-regions " + workplace.Build("world.db"), "decompose_regions"),
           command("stage build-vocabulary " + workplace.Build("features.db"), "build_vocabulary"),
-          command("stage link-appearance " + workplace.Build("matches.db"), "link_appearance")};
+          command("stage link-appearance " + workplace.Build("matches.db"), "link_appearance"),
+          command(fmt::format(
+                      "stage emit-map --name small --matches {0}/matches.db --classes {0}/classes.db --world "
+                      "{0}/world.db --regions {0}/regions.db --vocabulary {0}/vocabulary.db --appearance "
+                      "{0}/appearance.db",
+                      workplace.Build("")),
+                  "emit_map")};
 }
 
 TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {

@@ -94,6 +94,20 @@ void TryReplacedBlocks(std::string_view bytes) {
   TryMap(path);
 }
 
+// Postings are read without checks: what was decoded must be right.
+void ReadWords(const WordBlock& words, int64_t num_images) {
+  for (size_t i = 0; i < words.begins.size(); ++i) {
+    int64_t last = -1;
+    size_t num = 0;
+    words.ForPostings(i, [&](const Posting& posting) {
+      if (posting.document <= last || posting.document >= num_images || posting.count < 1) std::abort();
+      last = posting.document;
+      ++num;
+    });
+    if (num != words.NumPostings(i)) std::abort();
+  }
+}
+
 // Counts as the directory of a small map would state them: from the bytes.
 MapDirectory DirectoryFor(BlockKind kind, bool is_packed, std::string_view counts, size_t num_bytes) {
   MapDirectory directory;
@@ -133,9 +147,11 @@ void TryBlock(BlockKind kind, bool is_packed, std::string_view bytes) {
     case BlockKind::kDocumentNorms:
       (void)DecodeDocumentNorms(bytes, entry, "block").ok();
       break;
-    case BlockKind::kWords:
-      (void)DecodeWordBlock(bytes, entry, directory, "block").ok();
+    case BlockKind::kWords: {
+      const auto words = DecodeWordBlock(bytes, entry, directory, "block");
+      if (words.ok()) ReadWords(*words, directory.Count(BlockKind::kImages));
       break;
+    }
     case BlockKind::kImages: {
       const auto images = DecodeImageBlock(bytes, entry, directory, "block");
       if (images.ok()) (void)EncodeBlock(*images);

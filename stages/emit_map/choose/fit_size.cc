@@ -212,7 +212,7 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   std::optional<MatchModel> model(std::in_place, classes, ViewOptions(), num_threads);
   const std::vector<size_t> order = OrderOf(classes, *model, pool, {}, num_threads).First(pool.size());
   const PromiseMaker maker(classes, *model, num_threads);
-  model.reset();
+  model.reset();  // it takes as much memory as the promises
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
   for (const int bits : bits_tried) {
@@ -339,9 +339,8 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
       num_kept < classes.classes.size()
           ? OrderOf(classes, *model, Pool(fitted.keep), first, num_threads).First(num_kept)
           : Pool(fitted.keep);
-  // It takes as much as the promises.
   const PromiseMaker maker(classes, *model, num_threads);
-  model.reset();
+  model.reset();  // it takes as much memory as the promises
   fitted.keep = maker.Complete(chosen, basis.model, options.promise);
   fitted.promises = maker.Promise(fitted.keep, basis, options.promise);
   progress.Advance();

@@ -56,7 +56,7 @@ LandmarkOrder OrderOf(const Classes& classes, const MatchModel& model, std::vect
 // Makes promises about maps of a survey: at every node, with which probability a robot is localized.
 class PromiseMaker {
  public:
-  // `model`: of these classes, which must outlive it.
+  // `classes` must outlive it; `model`, learnt from them, need not.
   PromiseMaker(const Classes& classes, const MatchModel& model, int num_threads);
 
   // `fared`: how left-out images fared in maps of parts of the survey.

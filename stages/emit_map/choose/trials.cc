@@ -77,6 +77,7 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
     part.depth = of_views.depth;
     LandmarkOrderOptions of_order;
     of_order.first = FirstIn(survey, classes, first);
+    of_order.max_num_kept_sights /= rounds.size();  // of all parts together
     part.order.emplace(survey.classes, std::move(of_views), part.pool, of_order, threads);
     part.sights.emplace(survey.classes, KeypointErrors());
     progress.Advance();

@@ -84,6 +84,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "hold_out = 0 leaves nothing out, so there is nothing to do; give a ratio, or \"auto\"");
   }
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForSurvey("making maps without some images", arguments.files,
+                                             /*by_trial=*/true, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const WholeMap whole, ReadWholeMap(arguments));
   CAIRN_ASSIGN_OR_RETURN(const auto never_tried, NeverTried(whole.classes, arguments.matches_path));
   Result<LeftOutRuns> runs = ChooseRuns(whole.classes, arguments.options, never_tried);

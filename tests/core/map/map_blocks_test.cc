@@ -2,10 +2,12 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/blob.h"
 #include "core/base/random.h"
 #include "core/blocks/map_layout.h"
 #include "stages/emit_map/emit_map.h"
@@ -14,8 +16,10 @@
 namespace cairn {
 namespace {
 
+using testing::Each;
 using testing::ElementsAre;
 using testing::Pair;
+using testing::SizeIs;
 
 MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
@@ -64,6 +68,31 @@ TEST(MapLayout, SmallRegionsShareABlockAndNoneIsSplit) {
 TEST(MapLayout, LargeRegionsAreRunsOfBlocks) {
   EXPECT_THAT(LandmarkBlocks(RowsWithRegions({10, 2500}, 0)),
               ElementsAre(Pair(0, 10), Pair(10, 1024), Pair(1034, 1024), Pair(2058, 452)));
+}
+
+// Words with so many postings each, cut into blocks: numbers of words of each.
+std::vector<uint32_t> WordsOfBlocks(size_t num_words, size_t num_postings) {
+  MapRows rows;
+  rows.vocabulary.nodes.resize(1);
+  rows.vocabulary.inverted_files.assign(num_words, std::vector<Posting>(num_postings));
+  const MapLayout layout(rows);
+  std::vector<uint32_t> words_of_blocks;
+  for (const BlockEntry& entry : layout.entries()) {
+    if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) words_of_blocks.push_back(entry.count);
+  }
+  return words_of_blocks;
+}
+
+TEST(MapLayout, BlocksOfManyPostingsAreSmall) {
+  EXPECT_THAT(WordsOfBlocks(9, 1000), ElementsAre(5, 4));  // 4096 postings
+  EXPECT_THAT(WordsOfBlocks(4, size_t{1} << 10), ElementsAre(4));
+  EXPECT_THAT(WordsOfBlocks(3000, 1), ElementsAre(1024, 1024, 952));
+  // 1024 postings, of more than 2^22 in all.
+  const std::vector<uint32_t> at_limit = WordsOfBlocks(1 << 12, size_t{1} << 10);
+  EXPECT_THAT(at_limit, Each(4));
+  const std::vector<uint32_t> beyond = WordsOfBlocks((1 << 13) + 2, size_t{1} << 9);
+  EXPECT_THAT(beyond, Each(2));
+  EXPECT_THAT(beyond, SizeIs((1 << 12) + 1));
 }
 
 TEST(MapLayout, BlocksKnowTheirRegionsAndImages) {
@@ -260,10 +289,32 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
       const WordBlock words = layout.MakeWordBlock(entry);
       std::vector<std::vector<Posting>> postings;
-      for (size_t word = 0; word < words.begins.size(); ++word) postings.push_back(words.Postings(word));
-      EXPECT_EQ(MakeWordBlock(words.first, postings).bytes, words.bytes);
+      for (size_t word = 0; word < words.begins.size(); ++word) {
+        postings.push_back(words.Postings(word));
+        EXPECT_EQ(words.NumPostings(word), postings.back().size());
+      }
+      EXPECT_EQ(PackWords(words.first, postings).bytes, words.bytes);
+      // What is read without checks was checked.
+      const auto decode = [&](const std::string& first_word) {
+        return DecodeWordBlock(first_word + std::string(entry.count - 1, '\0'), entry, blocks.directory,
+                               "block");
+      };
+      const auto varint = [](uint64_t value) {
+        BlobWriter writer;
+        writer.Varint(value);
+        return writer.Take();
+      };
+      const uint64_t most = std::numeric_limits<int32_t>::max();
+      EXPECT_EQ(decode("\x01" + std::string("\x80\x00", 2))->Postings(0).at(0).document,
+                0);  // longer than needed
+      EXPECT_EQ(decode("\x01\x01" + varint(most - 2))->Postings(0).at(0).count,
+                std::numeric_limits<int32_t>::max());
+      EXPECT_FALSE(decode("\x01\x01" + varint(most - 1)).ok());
+      EXPECT_FALSE(decode("\x01" + std::string(9, '\x80') + "\x01").ok());
+      EXPECT_FALSE(decode("\x02" + std::string(1, '\0')).ok());
+      EXPECT_FALSE(decode(std::string(2, '\0')).ok());
       postings[0].back().document = 3;
-      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(MakeWordBlock(words.first, postings))).ok());
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(PackWords(words.first, postings))).ok());
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kStations)) {
       StationBlock stations = layout.MakeStationBlock(entry);
       stations.neighbours[2] = {1};

@@ -127,7 +127,7 @@ TEST(LandmarkOrder, IsAsGoodAsTakingWhatAddsMostEachTimeForAnyNumberOfThreads) {
     const LandmarkOrderOptions options{.enough_matches = 2};
     const std::vector<size_t> order = OrderLandmarks(classes, matches, All(classes), options, 1);
     EXPECT_EQ(OrderLandmarks(classes, matches, All(classes), options, 3), order);
-    for (const size_t num_kept : {0, 50}) {  // of some 144
+    for (const size_t num_kept : {0, 50}) {
       LandmarkOrderOptions keeping = options;
       keeping.max_num_kept_sights = num_kept;
       EXPECT_EQ(OrderLandmarks(classes, matches, All(classes), keeping, 2), order);
