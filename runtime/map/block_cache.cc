@@ -9,7 +9,7 @@ namespace {
 
 // What is dropped leaves holes in the C library's memory, which it keeps: they are given back whenever so
 // much was dropped.
-constexpr int64_t kDroppedBytes = int64_t{16} << 20;
+constexpr int64_t kDroppedBytes = int64_t{8} << 20;
 
 }  // namespace
 
