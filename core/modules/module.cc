@@ -28,9 +28,14 @@ bool IsOfMemory(const std::string& text) {
          (text.find("failed to map segment") != std::string::npos && IsMemoryLimited());
 }
 
+// What constructors of a module's libraries take (GDCM's tables, some 10 MiB): none of them can say that
+// there is no memory, which ends the program.
+constexpr size_t kConstructorsBytes = size_t{24} << 20;
+
 }  // namespace
 
 Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted) {
+  ::operator delete(::operator new(kConstructorsBytes));  // throws where there is not so much
   // Never closed: what it made, and what its libraries registered, live on.
   void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {

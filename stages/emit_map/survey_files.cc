@@ -9,7 +9,7 @@ namespace {
 
 // Bytes of memory per byte of the classes (bench/scale/README.md), and beside them what does not grow for
 // ever: sights that are kept (LandmarkOrderOptions).
-constexpr double kMemoryPerFileByte = 2, kMemoryPerFileByteOfTrials = 7, kMemoryPerFileByteOfSights = 6;
+constexpr double kMemoryPerFileByte = 2, kMemoryPerFileByteOfTrials = 5.5, kMemoryPerFileByteOfSights = 7;
 constexpr double kMostMemoryOfSights = double{1 << 30};
 
 }  // namespace
