@@ -414,7 +414,7 @@ class MatchModel::Impl {
     const auto weight_of = [&](int32_t image) {
       double& weight = (*weights)[image];
       if (weight == kUnknown) {
-        weight = WeightAt(distance().tree().Squared(look.cam_from_world, image));
+        weight = WeightAt(distance().tree().SquaredFrom(look.cam_from_world.rotation, center, image));
         weighed.push_back(image);
       }
       return weight;

@@ -26,6 +26,12 @@ Pose PoseBetween(const Pose& a, const Pose& b, int part, int num_parts) {
   return {rotation, -(rotation * center)};
 }
 
+ViewTree TreeOf(const std::vector<PromiseNode>& nodes, double radius_m, double radius_deg) {
+  std::vector<Pose> poses;
+  for (const PromiseNode& node : nodes) poses.push_back(node.cam_from_world);
+  return {poses, radius_m, radius_deg};
+}
+
 std::vector<int32_t> ImagesApart(const ViewDistance& distance, const std::vector<int32_t>& images,
                                  double spacing) {
   std::vector<int32_t> chosen;

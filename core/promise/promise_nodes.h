@@ -22,6 +22,9 @@ struct PromiseNode {
 // places.
 Pose PoseBetween(const Pose& a, const Pose& b, int part, int num_parts);
 
+// To find the nodes near a pose.
+ViewTree TreeOf(const std::vector<PromiseNode>& nodes, double radius_m, double radius_deg);
+
 // A node answers for robots this many views' radii around it.
 inline constexpr double kNodeReach = 1.5;
 

@@ -18,12 +18,10 @@ constexpr double kMetTolerance = 1e-6;
 // Per node the nearest others, and those whose nearest it is, ascending.
 std::vector<std::vector<int32_t>> Neighbours(const std::vector<PromiseNode>& nodes, double radius,
                                              double radius_deg) {
-  std::vector<Pose> poses;
-  for (const PromiseNode& node : nodes) poses.push_back(node.cam_from_world);
-  const ViewTree tree(poses, radius, radius_deg);
+  const ViewTree tree = TreeOf(nodes, radius, radius_deg);
   std::vector<std::vector<int32_t>> neighbours(nodes.size());
   for (int32_t a = 0; a < std::ssize(nodes); ++a) {
-    for (const int32_t b : tree.Nearest(poses[a], kNumNeighbours, a)) {
+    for (const int32_t b : tree.Nearest(nodes[a].cam_from_world, kNumNeighbours, a)) {
       neighbours[a].push_back(b);
       neighbours[b].push_back(a);
     }

@@ -62,12 +62,13 @@ class ViewTree {
         });
   }
 
-  // ViewDistanceSquared of two views, and of a pose and a view.
+  // ViewDistanceSquared of two views, of a pose and a view, and of a pose whose camera stands at `center`.
   double Squared(size_t a, size_t b) const { return SquaredFrom(rotations_[a], centers_[a], b); }
   double Squared(const Pose& cam_from_world, size_t b) const {
     return SquaredFrom(cam_from_world.rotation, cam_from_world.Center(), b);
   }
-  // The same; infinity where places alone make it more than `most`.
+  double SquaredFrom(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& center, size_t view) const;
+  // Of two views; infinity where places alone make it more than `most`.
   double SquaredUpTo(double most, size_t a, size_t b) const {
     if ((centers_[a] - centers_[b]).squaredNorm() > most * radius_m_ * radius_m_)
       return std::numeric_limits<double>::infinity();
@@ -87,7 +88,6 @@ class ViewTree {
   };
 
   int32_t Build(int32_t first, int32_t last);
-  double SquaredFrom(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& center, size_t view) const;
   // Square of the distance of a node's box, metres.
   double BoxSquared(const Node& node, const Eigen::Vector3d& place) const {
     return (node.low - place).cwiseMax(place - node.high).cwiseMax(0).squaredNorm();

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 namespace cairn {
 
@@ -50,9 +50,13 @@ std::vector<double> ScoreDocuments(const Vocabulary& vocabulary, const BagOfWord
 }
 
 std::vector<int32_t> BestFirst(const std::vector<double>& scores) {
-  std::vector<int32_t> order(scores.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return scores[a] > scores[b]; });
+  std::vector<std::pair<double, int32_t>> pairs;  // scores side by side are sorted faster
+  pairs.reserve(scores.size());
+  for (const double score : scores) pairs.emplace_back(-score, static_cast<int32_t>(pairs.size()));
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<int32_t> order;
+  order.reserve(pairs.size());
+  for (const auto& [negative, i] : pairs) order.push_back(i);
   return order;
 }
 

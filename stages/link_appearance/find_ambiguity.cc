@@ -137,33 +137,27 @@ class AmbiguitySearch {
   // likeliest remaining node; a place includes the nodes that show the same as its first one.  The remaining,
   // very unlikely nodes count as one place.
   std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
-    std::vector<std::pair<double, NodeIdx>> others;  // and their probabilities, the likeliest first
-    for (NodeIdx other = 0; other < std::ssize(probabilities); ++other) {
-      if (other != node && probabilities[other] > 0) others.emplace_back(probabilities[other], other);
-    }
-    std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) {
-      return a.first != b.first ? a.first > b.first : a.second < b.second;
-    });
+    std::vector<NodeIdx> left = {node};
     std::vector<char> is_left(probabilities.size(), 0);
     is_left[node] = 1;
     double rest = 1 - probabilities[node];
-    size_t num_others = 0;
-    for (; num_others < others.size() && rest >= kNegligible; ++num_others) {
-      is_left[others[num_others].second] = 1;
-      rest -= others[num_others].first;
+    for (const NodeIdx other : BestFirst(probabilities)) {
+      if (rest < kNegligible || probabilities[other] <= 0) break;
+      if (other == node) continue;
+      left.push_back(other);
+      is_left[other] = 1;
+      rest -= probabilities[other];
     }
     std::vector<double> places = {std::max(rest, 0.0)};
-    const auto add_place = [&](NodeIdx first) {
-      if (is_left[first] == 0) return;
+    for (const NodeIdx first : left) {
+      if (is_left[first] == 0) continue;
       double sum = 0;
       ForTheSame(first, [&](NodeIdx other) {
         if (is_left[other] != 0) sum += probabilities[other];
         is_left[other] = 0;
       });
       places.push_back(sum);
-    };
-    add_place(node);
-    for (size_t i = 0; i < num_others; ++i) add_place(others[i].second);
+    }
     return places;
   }
 

@@ -70,6 +70,34 @@ TEST(FindAmbiguity, TwinsHaveTheEntropyOfTwoPlacesAndAreConfusable) {
   EXPECT_EQ(appearance.confusable[0], (ConfusablePair{0, 2, 1}));
 }
 
+// Images 0 to 5 look the same, so that the entropy says into how many nodes places fall.
+TEST(FindAmbiguity, PlacesAreWhatIsLinkedOrNear) {
+  const auto entropy_of = [](const std::vector<double>& sizes) {
+    double entropy = 0;
+    for (const double size : sizes) entropy -= size / 6 * std::log(size / 6);
+    return entropy;
+  };
+  const Vocabulary vocabulary =
+      VocabularyOf({{0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {2}, {2}, {3}}, 4);
+  // 1 is near 0 and linked to it, 2 is near 1, 3 has no place and is linked to 2, 4 has no place, 5 is 3 m
+  // from 0.
+  Appearance appearance = NodesWithAnImageEach(9, {{0, 1}, {2, 3}});
+  auto places = PlacesAt({-1, -1, -1, 0, 0, 2, 90, 90, 90});
+  const double ys[] = {-1, 1.5, 2.5, 0, 0, -1};
+  for (int node = 0; node < 6; ++node) places[node]->position.y() = ys[node];
+  places[3].reset();
+  places[4].reset();
+  Appearance told = appearance;
+  ASSERT_TRUE(FindAmbiguity(vocabulary, places, {}, 1, nullptr, &appearance).ok());
+  EXPECT_NEAR(*appearance.nodes[0].entropy, entropy_of({2, 2, 1, 1}), 1e-3);
+  EXPECT_NEAR(*appearance.nodes[1].entropy, entropy_of({3, 1, 1, 1}), 1e-3);
+  EXPECT_NEAR(*appearance.nodes[3].entropy, entropy_of({2, 2, 1, 1}), 1e-3);
+  EXPECT_NEAR(*appearance.nodes[4].entropy, entropy_of({1, 2, 2, 1}), 1e-3);
+  const AppearanceGraph look_alikes = GraphOf(9, {{1, 2}});
+  ASSERT_TRUE(FindAmbiguity(vocabulary, places, {}, 1, nullptr, &told, &look_alikes).ok());
+  EXPECT_NEAR(*told.nodes[1].entropy, entropy_of({2, 2, 1, 1}), 1e-3);
+}
+
 TEST(FindAmbiguity, ImagesOfOnePlaceAreNoLookAlikes) {
   // 0, 1, 2 stand side by side, 3 is linked to 0, and 4, 5 side by side far away: all show the same.
   const std::vector<std::vector<WordIdx>> words = {{0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {2}};

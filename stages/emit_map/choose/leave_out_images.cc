@@ -166,10 +166,9 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
   LeftOutRounds rounds(num_images);
   for (size_t i = step / 2; i < may_be_tried.size(); i += step) {
     const size_t tried = may_be_tried[i];
-    std::set<size_t> view;
-    for (size_t image = 0; image < num_images; ++image) {
-      if (image == tried || distance.Squared(tried, image) < 1) view.insert(image);
-    }
+    std::set<size_t> view = {tried};
+    distance.tree().ForNear(tried, 1,
+                            [&](int32_t image, double) { view.insert(static_cast<size_t>(image)); });
     rounds.Add({tried}, view);
   }
   return rounds.Rounds();

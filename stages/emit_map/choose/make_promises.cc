@@ -146,9 +146,7 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const PromiseBasis
       promises.findings.nodes[node].region = static_cast<RegionIdx>(promises.regions.size());
     promises.regions.push_back({.images = {}, .classes = region.classes});
   }
-  std::vector<Pose> poses;
-  for (const PromiseNode& node : nodes_) poses.push_back(node.cam_from_world);
-  const ViewTree tree(poses, distance_.radius(), distance_.radius_deg());
+  const ViewTree tree = TreeOf(nodes_, distance_.radius(), distance_.radius_deg());
   for (size_t image = 0; image < classes_.images.size(); ++image) {
     const int32_t nearest = tree.Nearest(classes_.images[image].cam_from_world, 1).front();
     promises.regions[promises.findings.nodes[nearest].region].images.push_back(image);

@@ -38,6 +38,12 @@ TEST(LaterViews, OfTwoRadiiTheNearestShowsTheView) {
   EXPECT_THAT(LaterViewsOf(classes), ElementsAre(-1, -1, -1, 0, 0, -1));
 }
 
+TEST(LaterViews, OfTwoThatAreAsNearTheOneOfTheLaterSessionShowsTheView) {
+  Classes classes = SurveyAt({{"a", 0}, {"b", 0.25}, {"c", -0.25}});
+  classes.sessions = {"a", "b", "c"};
+  EXPECT_THAT(LaterViewsOf(classes), ElementsAre(2, -1, -1));
+}
+
 // A chain of sessions, each a little farther on: what stands for an image is of today itself.
 TEST(LaterViews, AreOfToday) {
   Classes classes = SurveyAt({{"a", 0}, {"b", 0.3}, {"c", 0.6}, {"a", 0.25}, {"c", 0.9}});

@@ -1,10 +1,12 @@
 #include "core/promise/promise_nodes.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/random.h"
 #include "core/promise/expectation.h"
 #include "core/promise/promise_regions.h"
 #include "tests/core/promise/wall_survey.h"
@@ -73,6 +75,28 @@ TEST(PromiseNodes, NearImagesAreOne) {
   classes.images[1].cam_from_world.translation = {0.09, 0, 0};  // half a radius is 0.1 m
   classes.images[2].cam_from_world.translation = {0.11, 0, 0};
   EXPECT_THAT(ImagesOf(NodesOf(classes)), ElementsAre(std::array{0, 0}, std::array{2, 2}));
+}
+
+TEST(ImagesApart, AreThoseThatNoneBeforeThemIsNear) {
+  Random random(4);
+  Classes classes = WallSurvey(80, 0);
+  for (SurveyImage& image : classes.images) {
+    image.cam_from_world = {
+        Eigen::Quaterniond(Eigen::AngleAxisd(random.Uniform(-1, 1), Eigen::Vector3d::UnitY())),
+        {random.Uniform(-1, 1), random.Uniform(-1, 1), 0}};
+  }
+  AddClass({0, 0, 2}, {1}, 3, &classes);
+  const ViewDistance distance(classes, {});
+  std::vector<int32_t> every_second;
+  for (int32_t i = 1; i < 80; i += 2) every_second.push_back(i);
+  std::vector<int32_t> apart;
+  for (const int32_t i : every_second) {
+    if (std::none_of(apart.begin(), apart.end(), [&](int32_t other) { return distance(i, other) < 2; }))
+      apart.push_back(i);
+  }
+  EXPECT_GT(apart.size(), 5);
+  EXPECT_LT(apart.size(), 35);
+  EXPECT_EQ(ImagesApart(distance, every_second, 2), apart);
 }
 
 TEST(PoseBetween, TurnsInEqualSteps) {
