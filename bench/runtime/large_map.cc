@@ -8,8 +8,6 @@
 //   large_map query MAP NUM_QUERIES BUDGET_MIB [IMAGE]
 //                                                  opening time, memory, fixes; every query in another room;
 //                                                  beside SIFT on an image, which takes memory of its own
-#include <malloc.h>
-
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -19,9 +17,8 @@
 #include <optional>
 #include <string>
 
-#include <opencv2/features2d.hpp>
-
 #include "bench/runtime/fix_figures.h"
+#include "bench/runtime/opencv_sift.h"
 #include "core/features/sift.h"
 #include "core/images/image_file.h"
 #include "core/seal/map_seal.h"
@@ -179,9 +176,7 @@ class SiftTimes {
 
  private:
   const cv::Mat grey_;
-  const cv::Ptr<cv::SIFT> opencv_ =
-      cv::SIFT::create(SiftOptions().max_num_features, 3, SiftOptions().contrast_threshold,
-                       SiftOptions().edge_threshold, 1.6, CV_32F);
+  const cv::Ptr<cv::SIFT> opencv_ = OpenCvSift();
   std::vector<double> opencv_ms_, ours_ms_;
   size_t num_features_ = 0;
 };
@@ -193,10 +188,6 @@ constexpr int kNumOutliers = 1700;
 Status Ask(const std::string& path, int num_queries, int64_t budget_mib, const std::string& image_path) {
   std::optional<SiftTimes> sift;
   if (!image_path.empty()) {
-    cv::setNumThreads(1);
-    // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
-    mallopt(M_MMAP_THRESHOLD, 1 << 30);
-    mallopt(M_TRIM_THRESHOLD, 1 << 30);
     CAIRN_ASSIGN_OR_RETURN(cv::Mat grey, ReadGreyImage(image_path));
     sift.emplace(std::move(grey));
   }

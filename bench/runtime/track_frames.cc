@@ -2,8 +2,6 @@
 // the map expects: processor time of a frame, beside that of OpenCV's SIFT on the same image, fixes, errors,
 // and errors squared over their covariance.  Every `--kidnap-every` frames the camera is carried elsewhere:
 // the drive is shown in pieces, in another order.
-#include <malloc.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <limits>
@@ -12,10 +10,9 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <opencv2/core/utility.hpp>
-#include <opencv2/features2d.hpp>
 
 #include "bench/runtime/fix_figures.h"
+#include "bench/runtime/opencv_sift.h"
 #include "core/capture/capture.h"
 #include "core/images/image_file.h"
 #include "runtime/track/region_tracker.h"
@@ -50,10 +47,7 @@ struct Figures : FixFigures {
 
 Status Run(const std::string& map_path, const std::string& capture_path, bool queries, int kidnap_every,
            int max_num_frames, int max_num_fine) {
-  cv::setNumThreads(1);
-  // OpenCV keeps its memory from image to image; else the system would clear its pages each time.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  const cv::Ptr<cv::SIFT> opencv = OpenCvSift();
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(map_path));
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(capture_path));
   std::vector<CaptureImage> frames = queries ? capture.queries : capture.images;
@@ -76,9 +70,6 @@ Status Run(const std::string& map_path, const std::string& capture_path, bool qu
   map_guided.features.max_num_fine_features = max_num_fine;
   whole_images.features.map_guided = false;
   RegionTracker tracker(map, {}, whole_images), guided_tracker(map, {}, map_guided);
-  const cv::Ptr<cv::SIFT> opencv =
-      cv::SIFT::create(SiftOptions().max_num_features, 3, SiftOptions().contrast_threshold,
-                       SiftOptions().edge_threshold, 1.6, CV_32F);
   Figures scratch, tracked, guided;
   std::vector<double> opencv_ms, sift_ms;
   for (const CaptureImage& frame : frames) {

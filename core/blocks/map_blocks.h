@@ -126,6 +126,7 @@ struct WordBlock {
   std::string bytes;
   std::vector<uint32_t> begins;  // per word: where it begins in `bytes`
 
+  size_t num_words() const { return begins.size(); }
   size_t NumPostings(size_t i) const {
     const char* at = bytes.data() + begins[i];
     return NextVarint(&at);

@@ -53,7 +53,7 @@ class RowsReader {
           // The tree comes before the words.
           if (rows_.vocabulary.nodes.empty())
             return MakeError(ErrorCode::kCorrupt, "{}: words without a tree", what);
-          for (size_t i = 0; i < words.begins.size(); ++i) {
+          for (size_t i = 0; i < words.num_words(); ++i) {
             num_bytes_left_ -= static_cast<int64_t>(words.NumPostings(i) * sizeof(Posting));
             if (num_bytes_left_ < 0) return TooMuch();
             rows_.vocabulary.inverted_files[words.first + i] = words.Postings(i);

@@ -63,7 +63,7 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
     model->vocabulary = *tree;
     for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kWords); ++ordinal) {
       CAIRN_ASSIGN_OR_RETURN(const auto words, map.Words(ordinal));
-      for (size_t i = 0; i < words->begins.size(); ++i)
+      for (size_t i = 0; i < words->num_words(); ++i)
         model->vocabulary.inverted_files[words->first + i] = words->Postings(i);
     }
     model->vocabulary.document_ids.resize(map.num_images());

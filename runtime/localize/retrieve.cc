@@ -100,7 +100,7 @@ Result<PooledVector<Candidate>> RetrieveByVocabulary(const Map& map, const Query
   for (size_t begin = 0, end = 0; begin < words.size(); begin = end) {
     const WordIdx word = words[begin];
     while (end < words.size() && words[end] == word) ++end;
-    if (!block || word >= block->first + static_cast<int64_t>(block->begins.size())) {
+    if (!block || word >= block->first + static_cast<int64_t>(block->num_words())) {
       CAIRN_ASSIGN_OR_RETURN(block, map.Words(map.directory().OrdinalOf(BlockKind::kWords, word)));
     }
     const size_t num_postings = block->NumPostings(word - block->first);

@@ -96,7 +96,7 @@ void TryReplacedBlocks(std::string_view bytes) {
 
 // Postings are read without checks: what was decoded must be right.
 void ReadWords(const WordBlock& words, int64_t num_images) {
-  for (size_t i = 0; i < words.begins.size(); ++i) {
+  for (size_t i = 0; i < words.num_words(); ++i) {
     int64_t last = -1;
     size_t num = 0;
     words.ForPostings(i, [&](const Posting& posting) {

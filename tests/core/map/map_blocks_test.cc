@@ -289,7 +289,7 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
       const WordBlock words = layout.MakeWordBlock(entry);
       std::vector<std::vector<Posting>> postings;
-      for (size_t word = 0; word < words.begins.size(); ++word) {
+      for (size_t word = 0; word < words.num_words(); ++word) {
         postings.push_back(words.Postings(word));
         EXPECT_EQ(words.NumPostings(word), postings.back().size());
       }
