@@ -1,8 +1,11 @@
 #include "stages/decompose_views/plan/clean_plan.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/random.h"
+#include "core/geometry/vector_geometry.h"
 #include "tests/decompose_views/plan_fixture.h"
 
 namespace cairn::decompose_views {
@@ -83,6 +86,42 @@ TEST(CleanPlan, AWallIsOneWallOnBothSidesOfADoorpost) {
   const auto result = Cleaned("0,0,2,0\n2,0,4,0\n2,0,2,-1");
   EXPECT_EQ(result.plan.num_walls(), 2);
   EXPECT_EQ(result.plan.pieces.size(), 3u);
+}
+
+// Walls that run almost along each other share pieces and part again: each wall is one line, on which all of
+// its pieces lie.
+TEST(CleanPlan, PiecesLieOnTheirWalls) {
+  int num_shared = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    Random random(seed);
+    std::string text;
+    for (int i = 0; i < 25; ++i) {
+      const double x = random.Uniform(0, 10), y = random.Uniform(0, 10), angle = random.Uniform(0, 6.2832);
+      const double length = random.Uniform(1, 6);
+      const double dx = length * std::cos(angle), dy = length * std::sin(angle);
+      text += fmt::format("{},{},{},{}\n", x, y, x + dx, y + dy);
+      // Another that begins on it and ends a little beside it.
+      if (i % 2 == 0)
+        text += fmt::format("{},{},{},{}\n", x + 0.3 * dx, y + 0.3 * dy, x + 1.4 * dx - 0.06 * dy,
+                            y + 1.4 * dy + 0.06 * dx);
+    }
+    CleanPlanOptions options;
+    options.snap_m = 0.05;
+    options.simplify_m = 0.03;
+    const auto result = Cleaned(text, options);
+    num_shared += Count(result, PlanChangeKind::kOverlap);
+    for (const PlanPiece& piece : result.plan.pieces) {
+      const PlanWall& wall = result.plan.walls[piece.wall];
+      const Eigen::Vector2d along = (wall.end - wall.start).normalized();
+      for (const int32_t vertex : {piece.start, piece.end}) {
+        const Eigen::Vector2d offset = result.plan.Metres(result.plan.vertices[vertex]) - wall.start;
+        EXPECT_LT(std::abs(Cross(along, offset)), 0.035) << "seed " << seed << ", wall " << piece.wall;
+        EXPECT_GT(along.dot(offset), -1e-6);
+        EXPECT_LT(along.dot(offset), wall.Length() + 1e-6);
+      }
+    }
+  }
+  EXPECT_GT(num_shared, 20);
 }
 
 TEST(CleanPlan, CoordinatesFarFromTheOriginLoseNothing) {

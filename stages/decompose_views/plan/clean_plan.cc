@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "core/base/progress.h"
 #include "stages/decompose_views/plan/check_rings.h"
@@ -226,12 +228,16 @@ class Cleaner {
     NoteCrossings(noded);
     std::vector<PlanPiece> pieces = WithoutOverlaps(noded, /*note=*/true);
     const double tolerance = options_.simplify_m / options_.grid_m;
+    std::vector<int32_t> origins(walls_.size());  // of the pieces' walls, among walls_
+    std::iota(origins.begin(), origins.end(), 0);
     // Where joining moved a wall it may touch others: divide again until nothing changes.
     for (size_t before = pieces.size() + 1; pieces.size() != before;) {
       before = pieces.size();
-      const JoinedWalls joined = JoinWalls(noded.vertices, pieces, tolerance, input_.closed());
+      JoinedWalls joined = JoinWalls(noded.vertices, pieces, tolerance, input_.closed());
+      for (int32_t& origin : joined.origins) origin = origins[origin];
+      origins = std::move(joined.origins);
       for (const auto& [vertex, wall] : joined.removed_vertices)
-        Note(PlanChangeKind::kPointRemoved, walls_[wall].line, noded.vertices[vertex]);
+        Note(PlanChangeKind::kPointRemoved, walls_[origins[wall]].line, noded.vertices[vertex]);
       segments.clear();
       for (const PlanPiece& piece : joined.pieces)
         segments.push_back({Real(noded.vertices[piece.start]), Real(noded.vertices[piece.end]), piece.wall});
@@ -270,7 +276,7 @@ class Cleaner {
     return pieces;
   }
 
-  // Numbers walls by their first piece's old wall, ascending, and measures them.
+  // Numbers walls in the order of their pieces', and measures them.
   void MakePlan(const std::vector<GridPoint>& vertices, std::vector<PlanPiece> pieces) {
     FloorPlan& plan = result_.plan;
     plan.vertices = vertices;

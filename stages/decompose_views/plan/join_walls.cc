@@ -101,14 +101,16 @@ class Joiner {
   }
 
   void Emit(const Chain& chain, JoinedWalls* result) const {
+    const auto wall = static_cast<int32_t>(result->origins.size());
+    result->origins.push_back(chain.wall);
     int32_t from = chain.vertices.front();
     for (size_t i = 1; i < chain.vertices.size(); ++i) {
       const int32_t vertex = chain.vertices[i];
       if (i + 1 < chain.vertices.size() && at_vertex_[vertex].size() == 2) {
-        result->removed_vertices.push_back({vertex, chain.wall});
+        result->removed_vertices.push_back({vertex, wall});
         continue;
       }
-      result->pieces.push_back({from, vertex, chain.wall});
+      result->pieces.push_back({from, vertex, wall});
       from = vertex;
     }
   }
