@@ -1,17 +1,21 @@
 // views_logs LOG [MAX_SCANS]: a map of segments built from every second scan of a Carmen log at the log's
 // poses, the other scans localized in it without odometry.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numeric>
+#include <string>
+#include <vector>
 
 #include <Eigen/LU>
 
 #include "core/base/parallel.h"
 #include "core/line/memory.h"
 #include "core/plan/views_database.h"
-#include "runtime/laser/interpretation_tree.h"
+#include "runtime/beams/scan_locator.h"
 #include "stages/decompose_views/decompose_views.h"
 
 namespace {
@@ -58,6 +62,88 @@ void AddSegment(const Vec2& start, const Vec2& end, std::vector<MapWall>* walls)
   walls->push_back({middle, along, -0.5 * length, 0.5 * length, length, 1});
 }
 
+// What became of one scan.
+struct Outcome {
+  bool first = false, any = false, none = true, single = false;
+  double probability = 0;
+  double tried = 0, seconds = 0;
+  double nees = -1;  // of the first pose, where it is right
+};
+
+Outcome LocateOne(const ScanLocator& locator, const RangeScan& scan, const ScanSegmentsOptions& options) {
+  Outcome outcome;
+  const double begin = Seconds();
+  const auto located = locator.Locate(ViewOf(scan, options));
+  outcome.seconds = Seconds() - begin;
+  if (!located.ok()) return outcome;
+  outcome.tried = static_cast<double>(located->num_tried);
+  outcome.none = located->hypotheses.empty();
+  for (size_t k = 0; k < located->hypotheses.size(); ++k) {
+    const ScanHypothesis& found = located->hypotheses[k];
+    const bool right = (found.pose.position - scan.pose.position).norm() <= 0.25 &&
+                       std::abs(WrapAngle(found.pose.heading_rad - scan.pose.heading_rad)) <= 5 * kDegree;
+    outcome.any = outcome.any || right;
+    if (k > 0) continue;
+    outcome.first = right;
+    outcome.probability = found.probability;
+    outcome.single = located->hypotheses.size() == 1 && found.determined;
+    if (!right) continue;
+    Eigen::Vector3d error;
+    error << found.pose.position - scan.pose.position,
+        WrapAngle(found.pose.heading_rad - scan.pose.heading_rad);
+    outcome.nees = error.dot(found.covariance.inverse() * error);
+  }
+  return outcome;
+}
+
+std::string Row(const std::string& search, const std::vector<Outcome>& outcomes) {
+  int first = 0, any = 0, none = 0, single = 0, single_right = 0;
+  double tried = 0, seconds = 0;
+  for (const Outcome& outcome : outcomes) {
+    first += outcome.first;
+    any += outcome.any;
+    none += outcome.none;
+    single += outcome.single;
+    single_right += outcome.single && outcome.first;
+    tried += outcome.tried;
+    seconds += outcome.seconds;
+  }
+  const auto num = static_cast<double>(outcomes.size());
+  return fmt::format("| {} | {} | {} ({:.1f} %) | {} ({:.1f} %) | {} | {} of {} | {:.0f} | {:.1f} |\n",
+                     search, outcomes.size(), first, 100 * first / num, any, 100 * any / num, none,
+                     single_right, single, tried / num, 1e3 * seconds / num);
+}
+
+// How far probabilities and covariances may be believed.
+std::string Figures(const std::string& search, const std::vector<Outcome>& outcomes) {
+  std::string text = fmt::format("{}: right of those with a probability", search);
+  const std::array<double, 6> bins = {0, 0.5, 0.9, 0.99, 0.999, 1.1};
+  for (size_t bin = 0; bin + 1 < bins.size(); ++bin) {
+    int num = 0, right = 0;
+    double sum = 0;
+    for (const Outcome& outcome : outcomes) {
+      if (outcome.none || outcome.probability < bins[bin] || outcome.probability >= bins[bin + 1]) continue;
+      ++num;
+      right += outcome.first;
+      sum += outcome.probability;
+    }
+    if (num > 0)
+      text += fmt::format("; of {:g} or more: {} of {}, {:.1f} expected", bins[bin], right, num, sum);
+  }
+  std::vector<double> nees;
+  for (const Outcome& outcome : outcomes) {
+    if (outcome.nees >= 0) nees.push_back(outcome.nees);
+  }
+  std::sort(nees.begin(), nees.end());
+  if (nees.empty()) return text + "\n";
+  // 3 degrees of freedom: mean 3, median 2.37
+  return text + fmt::format(
+                    "\n{}: normalised error squared of right first poses: mean {:.2f}, median {:.2f}, "
+                    "90th percentile {:.2f}\n",
+                    search, std::accumulate(nees.begin(), nees.end(), 0.0) / nees.size(),
+                    nees[nees.size() / 2], nees[nees.size() * 9 / 10]);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -97,97 +183,30 @@ int main(int argc, char** argv) {
               result->views.num_faces(), Seconds() - start);
   if (const char* path = std::getenv("VIEWS_DB"))
     (void)WriteViews(result->views, path, progress, [](SQLite::Database&) { return Ok(); });
-  const ViewSearchIndex index(result->views);
   std::vector<size_t> queries;
   const size_t max_scans = argc > 2 ? std::atoi(argv[2]) : scans->size();
   const size_t step = std::max<size_t>(2, 2 * (scans->size() / 2 / std::max<size_t>(1, max_scans)));
   for (size_t i = 1; i < scans->size(); i += step) queries.push_back(i);
   std::printf(
-      "| search | scans | fewer than 3 segments | segments | first right | any right | no solution | wrong | "
-      "nodes | ms |\n|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const char* search : {"standard", "vir"}) {
-    struct Outcome {
-      bool tried = false, first = false, any = false, none = false;
-      double segments = 0, nodes = 0, seconds = 0, nees = -1;  // of the first pose, where it is right
-    };
+      "| search | scans | first right | any right | no solution | one solution, determined: right | tried | "
+      "ms "
+      "|\n|---|---|---|---|---|---|---|---|\n");
+  std::string more;
+  for (const char* search : {"beams", "vir", "standard"}) {
+    ScanLocatorOptions locator_options;
+    locator_options.search = search;
+    const auto locator = ScanLocator::Make(result->views, locator_options);
+    if (!locator.ok()) {
+      std::fprintf(stderr, "%s\n", locator.error().message.c_str());
+      return 1;
+    }
     std::vector<Outcome> outcomes(queries.size());
-    ParallelFor(static_cast<int64_t>(queries.size()), 0, [&](int64_t i) {
-      const RangeScan& scan = (*scans)[queries[i]];
-      std::vector<ScanSegment> segments = FindScanSegments(scan, segment_options);
-      Outcome& outcome = outcomes[i];
-      if (segments.size() < 3) return;
-      outcome.tried = true;
-      outcome.segments = static_cast<double>(segments.size());
-      InterpretationTreeOptions tree;
-      tree.search = search;
-      tree.max_null_ratio = 0.4;
-      tree.one_segment_per_wall = false;
-      tree.position_tolerance_m = 0.15;
-      tree.length_tolerance_m = 0.4;
-      tree.angle_tolerance_deg = 3;
-      tree.max_num_nodes = 2e6;
-      const double begin = Seconds();
-      auto found = SearchInterpretations(index, segments, tree);
-      int64_t num_nodes = found->num_nodes;
-      if (found->solutions.empty()) {  // what stands in the room may be most of what is seen
-        tree.max_null_ratio = 0.6;
-        found = SearchInterpretations(index, segments, tree);
-        num_nodes += found->num_nodes;
-      }
-      outcome.seconds = Seconds() - begin;
-      outcome.nodes = static_cast<double>(num_nodes);
-      outcome.none = found->solutions.empty();
-      for (size_t k = 0; k < found->solutions.size(); ++k) {
-        const PlanarPose& pose = found->solutions[k].pose;
-        const bool right = (pose.position - scan.pose.position).norm() <= 0.25 &&
-                           std::abs(WrapAngle(pose.heading_rad - scan.pose.heading_rad)) <= 5 * kDegree;
-        outcome.any = outcome.any || right;
-        outcome.first = outcome.first || (k == 0 && right);
-        if (k > 0 || !right) continue;
-        Eigen::Vector3d error;
-        error << pose.position - scan.pose.position, WrapAngle(pose.heading_rad - scan.pose.heading_rad);
-        outcome.nees = error.dot(found->solutions[0].covariance.inverse() * error);
-      }
-      if (std::getenv("SHOW_FAILURES") != nullptr && !outcome.first && search[0] == 's') {
-        std::string text = fmt::format("scan {}: {} segments, {} solutions\n", queries[i], segments.size(),
-                                       found->solutions.size());
-        for (size_t k = 0; k < found->solutions.size(); ++k) {
-          const Interpretation& solution = found->solutions[k];
-          const double off_m = (solution.pose.position - scan.pose.position).norm();
-          const double off_deg =
-              std::abs(WrapAngle(solution.pose.heading_rad - scan.pose.heading_rad)) / kDegree;
-          if (k > 0 && (off_m > 0.5 || off_deg > 10)) continue;
-          text += fmt::format(
-              "  {}: off {:.2f} m {:.1f} deg, matched {} of {:.2f} m, hidden {:.2f} m, rms {:.3f} m\n", k,
-              off_m, off_deg, solution.num_matched, solution.matched_length_m, solution.hidden_length_m,
-              solution.rms_m);
-        }
-        std::fputs(text.c_str(), stdout);
-      }
-    });
-    int tried = 0, first = 0, any = 0, none = 0;
-    double nodes = 0, seconds = 0, num_segments = 0;
-    std::vector<double> nees;
-    for (const Outcome& outcome : outcomes) {
-      tried += outcome.tried;
-      first += outcome.first;
-      any += outcome.any;
-      none += outcome.none;
-      nodes += outcome.nodes;
-      seconds += outcome.seconds;
-      num_segments += outcome.segments;
-      if (outcome.nees >= 0) nees.push_back(outcome.nees);
-    }
-    std::printf("| %s | %zu | %zu | %.1f | %d (%.1f %%) | %d (%.1f %%) | %d | %d | %.0f | %.1f |\n", search,
-                queries.size(), queries.size() - tried, num_segments / tried, first,
-                100.0 * first / queries.size(), any, 100.0 * any / queries.size(), none, tried - none - first,
-                nodes / tried, 1e3 * seconds / tried);
-    std::sort(nees.begin(), nees.end());
-    if (!nees.empty()) {  // 3 degrees of freedom: mean 3, median 2.37
-      std::printf("normalised error squared of right first poses: median %.2f, 90th percentile %.2f\n",
-                  nees[nees.size() / 2], nees[nees.size() * 9 / 10]);
-    }
+    ParallelFor(static_cast<int64_t>(queries.size()), 0,
+                [&](int64_t i) { outcomes[i] = LocateOne(*locator, (*scans)[queries[i]], segment_options); });
+    std::fputs(Row(search, outcomes).c_str(), stdout);
     std::fflush(stdout);
+    more += Figures(search, outcomes);
   }
+  std::fputs(more.c_str(), stdout);
   return 0;
 }

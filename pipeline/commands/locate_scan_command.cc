@@ -8,7 +8,7 @@
 #include "core/geometry/pose.h"
 #include "core/plan/views.h"
 #include "pipeline/program/json_text.h"
-#include "runtime/laser/interpretation_tree.h"
+#include "runtime/beams/scan_locator.h"
 #include "runtime/map/open_views.h"
 #include "runtime/scans/read_scans.h"
 #include "stages/decompose_views/picture.h"
@@ -26,11 +26,11 @@ struct LocateScanArguments {
   std::optional<std::string> scan;  // otherwise all
   std::string svg;
   ScanSegmentsOptions segment_options;
-  InterpretationTreeOptions search_options{.max_null_ratio = 0.25, .one_segment_per_wall = false};
+  ScanLocatorOptions locator_options;
   OptionArguments option_arguments;
 };
 
-ordered_json InterpretationJson(const Interpretation& found, FaceIdx region) {
+ordered_json HypothesisJson(const ScanHypothesis& found, FaceIdx region) {
   ordered_json covariance = ordered_json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) covariance.push_back(found.covariance(row, column));
@@ -38,7 +38,9 @@ ordered_json InterpretationJson(const Interpretation& found, FaceIdx region) {
   return {{"x", found.pose.position.x()},
           {"y", found.pose.position.y()},
           {"heading_deg", DegFromRad(found.pose.heading_rad)},
+          {"probability", found.probability},
           {"determined", found.determined},
+          {"explained", found.explained_ratio},
           {"matched", found.num_matched},
           {"matched_length_m", found.matched_length_m},
           {"hidden_length_m", found.hidden_length_m},
@@ -48,23 +50,25 @@ ordered_json InterpretationJson(const Interpretation& found, FaceIdx region) {
           {"covariance", covariance}};
 }
 
-decompose_views::ViewsOverlay Overlay(const ScanView& scan, const InterpretationTreeResult& result) {
+decompose_views::ViewsOverlay Overlay(const ScanView& scan, const LocatedScan& result) {
   decompose_views::ViewsOverlay overlay;
-  for (size_t i = 0; i < result.solutions.size() && i < kMaxDrawnSolutions; ++i) {
-    const PlanarPose& pose = result.solutions[i].pose;
+  for (size_t i = 0; i < result.hypotheses.size() && i < kMaxDrawnSolutions; ++i) {
+    const PlanarPose& pose = result.hypotheses[i].pose;
     overlay.robots.push_back(
-        {pose.position, pose.heading_rad, result.solutions.size() > 1 ? std::to_string(i + 1) : ""});
+        {pose.position, pose.heading_rad, result.hypotheses.size() > 1 ? std::to_string(i + 1) : ""});
   }
-  if (result.solutions.empty()) return overlay;
-  const Interpretation& best = result.solutions[0];
+  if (result.hypotheses.empty()) return overlay;
+  const ScanHypothesis& best = result.hypotheses[0];
   for (size_t i = 0; i < scan.segments.size(); ++i) {
     overlay.segments.push_back({best.pose.FloorFromRobot(scan.segments[i].start),
                                 best.pose.FloorFromRobot(scan.segments[i].end), best.labels[i] >= 0});
   }
   overlay.captions = {
       fmt::format("{} of {} segments on walls", best.num_matched, scan.segments.size()),
-      fmt::format("{} {}", result.solutions.size(), result.solutions.size() == 1 ? "solution" : "solutions"),
-      fmt::format("pairings tried: {}", result.num_nodes)};
+      fmt::format("{:.0f} % of {} beams explained", 100 * best.explained_ratio, scan.beams.size()),
+      fmt::format("{} {}", result.hypotheses.size(),
+                  result.hypotheses.size() == 1 ? "solution" : "solutions"),
+      fmt::format("probability of the first: {:.3f}", best.probability)};
   return overlay;
 }
 
@@ -86,14 +90,15 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
                          ReadScans(arguments.scans, arguments.segment_options));
   CAIRN_ASSIGN_OR_RETURN(const auto chosen, ChosenScans(arguments, static_cast<int>(scans.size())));
   const auto [first, end] = chosen;
-  const ViewSearchIndex index(views);
-  const FaceLocator locator(views);
+  CAIRN_ASSIGN_OR_RETURN(const ScanLocator locator, ScanLocator::Make(views, arguments.locator_options));
+  const FaceLocator regions(views);
   int64_t num_located = 0;
   environment.progress->Begin("locate-scan", end - first, "scans");
   for (int i = first; i < end; ++i) {
     if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
-    ordered_json line = {{"scan", i}, {"segments", scans[i].segments.size()}};
-    const auto result = SearchInterpretations(index, scans[i].segments, arguments.search_options);
+    ordered_json line = {
+        {"scan", i}, {"beams", scans[i].beams.size()}, {"segments", scans[i].segments.size()}};
+    const auto result = locator.Locate(scans[i]);
     if (!result.ok()) {
       if (result.error().code != ErrorCode::kNoData || end - first == 1) {
         return MakeError(result.error().code, "{}: scan {}: {}", arguments.scans, i, result.error().message);
@@ -102,12 +107,10 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
       line["solutions"] = ordered_json::array();
     } else {
       ordered_json solutions = ordered_json::array();
-      for (const Interpretation& found : result->solutions)
-        solutions.push_back(InterpretationJson(found, locator.Find(found.pose.position)));
-      num_located += !result->solutions.empty();
-      line["nodes"] = result->num_nodes;
-      line["expanded"] = result->num_expanded;
-      line["candidates"] = result->num_candidates;
+      for (const ScanHypothesis& found : result->hypotheses)
+        solutions.push_back(HypothesisJson(found, regions.Find(found.pose.position)));
+      num_located += !result->hypotheses.empty();
+      line["tried"] = result->num_tried;
       line["complete"] = result->complete;
       line["solutions"] = std::move(solutions);
       if (!arguments.svg.empty() && i == first) {
@@ -145,10 +148,10 @@ Command LocateScanCommand() {
     parser.Add("--scan", arguments->scan, "number of the only scan to locate, from 0").Type("INT");
     parser.Add("--svg", arguments->svg, "also draw the first scan over the plan").Type("FILE.svg");
     OptionTable table = DescribeOptions(&arguments->segment_options);
-    for (Option& option : DescribeOptions(&arguments->search_options)) table.push_back(std::move(option));
-    arguments->option_arguments.Add(parser, std::move(table),
-                                    {"max_range_m", "sigma_range_m", "max_null_ratio", "max_missing_ratio",
-                                     "sigma_wall_m", "sigma_wall_deg", "first_only"});
+    for (Option& option : DescribeOptions(&arguments->locator_options)) table.push_back(std::move(option));
+    arguments->option_arguments.Add(
+        parser, std::move(table),
+        {"search", "least_odds", "max_range_m", "sigma_range_m", "sigma_wall_m", "sigma_wall_deg"});
   };
   command.run = [arguments](const CommandEnvironment& environment) {
     return RunLocateScan(*arguments, environment);

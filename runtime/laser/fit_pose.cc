@@ -40,6 +40,15 @@ void AddEndsBeyondWalls(const FloorPlan& plan, const std::vector<ScanSegment>& s
 
 }  // namespace
 
+double SquaredOffsets(const FloorPlan& plan, const ScanSegment& segment, LabelIdx label,
+                      const PlanarPose& pose) {
+  const Vec2 start = LabelStart(plan, label), along = (LabelEnd(plan, label) - start).normalized();
+  double sum = 0;
+  for (const Vec2& end : {segment.start, segment.end})
+    sum += std::pow(Cross(along, pose.FloorFromRobot(end) - start), 2);
+  return sum;
+}
+
 void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
              Interpretation* interpretation) {
   Interpretation& found = *interpretation;
@@ -111,11 +120,7 @@ void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
   found.covariance = information.inverse();
   double sum = 0;
   for (size_t i = 0; i < segments.size(); ++i) {
-    if (found.labels[i] < 0) continue;
-    const Vec2 start = LabelStart(plan, found.labels[i]),
-               along = (LabelEnd(plan, found.labels[i]) - start).normalized();
-    for (const Vec2& end : {segments[i].start, segments[i].end})
-      sum += std::pow(Cross(along, found.pose.FloorFromRobot(end) - start), 2);
+    if (found.labels[i] >= 0) sum += SquaredOffsets(plan, segments[i], found.labels[i], found.pose);
   }
   found.rms_m = std::sqrt(sum / (2 * found.num_matched));
 }

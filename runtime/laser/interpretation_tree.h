@@ -101,4 +101,8 @@ Result<InterpretationTreeResult> SearchInterpretations(const ViewSearchIndex& in
 // are left out.  Fills pose, covariance, determined, num_matched, matched_length_m and rms_m.
 void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments, Interpretation* interpretation);
 
+// Of the ends of a segment from a label's line at a pose, square metres: the sum of both.
+double SquaredOffsets(const FloorPlan& plan, const ScanSegment& segment, LabelIdx label,
+                      const PlanarPose& pose);
+
 }  // namespace cairn

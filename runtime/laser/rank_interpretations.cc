@@ -14,6 +14,8 @@ using Vec2 = Eigen::Vector2d;
 
 constexpr int kNumSamples = 8;  // of a segment
 
+}  // namespace
+
 double HiddenLength(const FloorPlan& plan, const std::vector<ScanSegment>& segments, const PlanarPose& pose,
                     double tolerance_m) {
   double hidden = 0;
@@ -26,8 +28,6 @@ double HiddenLength(const FloorPlan& plan, const std::vector<ScanSegment>& segme
   }
   return hidden;
 }
-
-}  // namespace
 
 bool SeesPoint(const FloorPlan& plan, const PlanarPose& pose, const Vec2& point, double tolerance_m) {
   const Vec2 ray = point - pose.position;

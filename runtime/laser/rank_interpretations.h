@@ -16,6 +16,11 @@ namespace cairn {
 bool SeesPoint(const FloorPlan& plan, const PlanarPose& pose, const Eigen::Vector2d& point,
                double tolerance_m);
 
+// Length of the segments that lie more than `tolerance_m` behind a wall at a pose, metres.  O(segments *
+// walls)
+double HiddenLength(const FloorPlan& plan, const std::vector<ScanSegment>& segments, const PlanarPose& pose,
+                    double tolerance_m);
+
 // Orders solutions by the length of the segments that support them less the length of those that contradict
 // them: a laser does not see through walls, so a segment, matched or not, that lies behind a wall of the plan
 // at the solution's pose contradicts it.  Ties: least rms.  Fills hidden_length_m, and fits the poses again

@@ -1,5 +1,6 @@
 #include "runtime/scans/carmen_log.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -10,6 +11,22 @@ namespace cairn {
 namespace {
 
 constexpr int kMaxBeams = 100000;
+
+// A range that occurs so often, and is the largest, is what the laser says where it met nothing.
+constexpr int kNumOften = 20;
+
+double LargestRange(const std::vector<RangeScan>& scans) {
+  double largest = 0;
+  int64_t num = 0;
+  for (const RangeScan& scan : scans) {
+    for (const double range : scan.ranges_m) {
+      if (range > largest) num = 0;
+      largest = std::max(largest, range);
+      num += range == largest ? 1 : 0;
+    }
+  }
+  return num >= kNumOften ? largest : std::numeric_limits<double>::infinity();
+}
 
 }  // namespace
 
@@ -43,6 +60,8 @@ Result<std::vector<RangeScan>> ParseCarmenLog(const std::string& text, const std
     scan.time_s = values[num_beams + 6];
     scans.push_back(std::move(scan));
   }
+  const double largest = LargestRange(scans);
+  for (RangeScan& scan : scans) scan.max_range_m = largest;
   if (scans.empty()) return MakeError(ErrorCode::kNoData, "{}: no FLASER line in it", what);
   return scans;
 }

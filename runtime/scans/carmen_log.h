@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,15 +14,16 @@ struct RangeScan {
   double first_angle_rad = 0;  // of the first beam, from the robot's x, counter-clockwise
   double step_rad = 0;         // from beam to beam
   std::vector<double> ranges_m;
-  PlanarPose pose;    // of the laser, from the log
-  double time_s = 0;  // of the log
+  double max_range_m = std::numeric_limits<double>::infinity();  // beams of this range met nothing
+  PlanarPose pose;                                               // of the laser, from the log
+  double time_s = 0;                                             // of the log
 };
 
 // Reads the FLASER lines of a Carmen log:
 //   FLASER n r_1 ... r_n x y theta odom_x odom_y odom_theta ipc_timestamp host logger_timestamp
 // n beams over 180 degrees, the first at -90 (n even: steps of 180 / n; odd: of 180 / (n - 1)).  Other
-// messages are left out.  Errors: NotFound, Corrupt (a line that is cut short or has an invalid number;
-// gzip), NoData (no FLASER).
+// messages are left out.  The largest range of a log is the laser's own where it occurs often.  Errors:
+// NotFound, Corrupt (a line that is cut short or has an invalid number; gzip), NoData (no FLASER).
 Result<std::vector<RangeScan>> ReadCarmenLog(const std::string& path);
 Result<std::vector<RangeScan>> ParseCarmenLog(const std::string& text, const std::string& what);
 

@@ -51,6 +51,10 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
 
 }  // namespace
 
+ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options) {
+  return {FindScanSegments(scan, options), BeamsOf(scan, options.max_range_m), scan.pose};
+}
+
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
                                          const ScanSegmentsOptions& options) {
   std::vector<ScanView> views;
@@ -60,11 +64,12 @@ Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::str
     CAIRN_ASSIGN_OR_RETURN(ScanView view, ParseSegments(text, what, options.sigma_range_m));
     if (view.segments.empty())
       return MakeError(ErrorCode::kNoData, "{}: neither FLASER lines nor segments in it", what);
+    view.beams = BeamsTo(view.segments);
     views.push_back(std::move(view));
     return views;
   }
   CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans, ParseCarmenLog(text, what));
-  for (const RangeScan& scan : scans) views.push_back({FindScanSegments(scan, options), scan.pose});
+  for (const RangeScan& scan : scans) views.push_back(ViewOf(scan, options));
   return views;
 }
 

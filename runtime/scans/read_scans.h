@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/geometry/planar_pose.h"
+#include "runtime/scans/beam.h"
 #include "runtime/scans/scan_segments.h"
 
 namespace cairn {
@@ -13,8 +14,12 @@ namespace cairn {
 // What one scan shows.
 struct ScanView {
   std::vector<ScanSegment> segments;
+  std::vector<Beam> beams;                // of a scan that is given by its segments: beams to these
   std::optional<PlanarPose> logged_pose;  // of a log's corrected poses
 };
+
+// What a scan of a log shows.
+ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options);
 
 // Reads scans: a Carmen log (a line begins with FLASER), whose scans are divided into segments, or the
 // segments of one scan as lines x0,y0,x1,y1[,sigma_angle_deg,sigma_offset_m] in the robot's frame, metres.

@@ -259,10 +259,9 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
   } else {
     spdlog::warn("{}", fit.error().message);
   }
-  std::vector<std::vector<ScanSegment>> scans;
+  std::vector<ScanView> scans;
   if (!arguments.scans_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(std::vector<ScanView> read, ReadScans(arguments.scans_path, {}));
-    for (ScanView& scan : read) scans.push_back(std::move(scan.segments));
+    CAIRN_ASSIGN_OR_RETURN(scans, ReadScans(arguments.scans_path, {}));
   }
   return CompareWithPlan(rows.views, rows.floor_from_world, report->images, scans, arguments.options,
                          environment.num_threads, *environment.progress, &report->figures);

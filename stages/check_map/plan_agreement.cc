@@ -5,7 +5,7 @@
 #include "core/base/parallel.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/planar_pose.h"
-#include "runtime/laser/interpretation_tree.h"
+#include "runtime/beams/scan_locator.h"
 
 namespace cairn::check_map {
 namespace {
@@ -25,9 +25,9 @@ bool Agree(const FloorPose& a, const FloorPose& b, const CheckMapOptions& option
 }  // namespace
 
 Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
-                       const std::vector<HeldOutResult>& images,
-                       const std::vector<std::vector<ScanSegment>>& scans, const CheckMapOptions& options,
-                       int num_threads, Progress& progress, std::map<std::string, double>* figures) {
+                       const std::vector<HeldOutResult>& images, const std::vector<ScanView>& scans,
+                       const CheckMapOptions& options, int num_threads, Progress& progress,
+                       std::map<std::string, double>* figures) {
   if (!scans.empty() && scans.size() != images.size()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} scans for {} held-out images; scan i is to be taken with image i", scans.size(),
@@ -49,16 +49,15 @@ Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
     bool found = false, first = false, any = false;
   };
   std::vector<Outcome> outcomes(scans.size());
-  const ViewSearchIndex index(views);
-  const InterpretationTreeOptions search{.max_null_ratio = 0.25, .one_segment_per_wall = false};
+  CAIRN_ASSIGN_OR_RETURN(const ScanLocator scan_locator, ScanLocator::Make(views, {}));
   progress.Begin("locating scans", static_cast<int64_t>(scans.size()), "scans");
   ParallelFor(static_cast<int64_t>(scans.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
-    const auto result = SearchInterpretations(index, scans[i], search);
+    const auto result = scan_locator.Locate(scans[i]);
     if (result.ok()) {
-      for (size_t k = 0; k < result->solutions.size(); ++k) {
+      for (size_t k = 0; k < result->hypotheses.size(); ++k) {
         outcomes[i].found = true;
-        const FloorPose camera = CameraOf(result->solutions[k].pose, options);
+        const FloorPose camera = CameraOf(result->hypotheses[k].pose, options);
         if (!fixes[i] || !Agree(camera, *fixes[i], options)) continue;
         outcomes[i].any = true;
         outcomes[i].first = outcomes[i].first || k == 0;

@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/plan/views.h"
-#include "runtime/scans/scan_segments.h"
+#include "runtime/scans/read_scans.h"
 #include "stages/check_map/check_map.h"
 
 namespace cairn::check_map {
@@ -23,8 +23,8 @@ namespace cairn::check_map {
 // A place that looks like another has several poses: the first may be the wrong one.  Same figures for any
 // number of threads.  Errors: InvalidArgument (not as many scans as images), Cancelled.
 Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
-                       const std::vector<HeldOutResult>& images,
-                       const std::vector<std::vector<ScanSegment>>& scans, const CheckMapOptions& options,
-                       int num_threads, Progress& progress, std::map<std::string, double>* figures);
+                       const std::vector<HeldOutResult>& images, const std::vector<ScanView>& scans,
+                       const CheckMapOptions& options, int num_threads, Progress& progress,
+                       std::map<std::string, double>* figures);
 
 }  // namespace cairn::check_map

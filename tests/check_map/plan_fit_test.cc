@@ -152,19 +152,19 @@ TEST(PlanGate, APlanThatDoesNotFitIsRefusedWhereAsked) {
 }
 
 // The walls as a laser at a pose sees them, at its own place in the camera's frame.
-std::vector<ScanSegment> Scan(const PlanarPose& laser) {
+ScanView Scan(const PlanarPose& laser) {
   std::vector<ScanSegment> segments;
   for (size_t i = 0; i < kCorners.size(); ++i) {
     segments.push_back({laser.RobotFromFloor(kCorners[i]),
                         laser.RobotFromFloor(kCorners[(i + 1) % kCorners.size()]), 1e-4, 1e-3, 50});
   }
-  return segments;
+  return {segments, BeamsTo(segments), {}};
 }
 
 TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
   const MapRows rows = SurveyOfRoom();
   std::vector<HeldOutResult> images(2);
-  std::vector<std::vector<ScanSegment>> scans;
+  std::vector<ScanView> scans;
   CheckMapOptions options;
   options.scan_x_m = 0.3;
   options.scan_heading_deg = 90;

@@ -1,0 +1,152 @@
+// views_half [--seed N] PLAN...: scans of half the view around from 60 random places of each plan, located by
+// the defaults: 180 beams, 2 cm of noise, and the same with a quarter of the beams hidden by what the plan
+// does not show.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "runtime/beams/scan_locator.h"
+#include "stages/decompose_views/plan/clean_plan.h"
+#include "stages/decompose_views/plan/read_plan.h"
+
+namespace {
+
+using namespace cairn;
+using Vec2 = Eigen::Vector2d;
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr int kNumPlaces = 60, kNumBeams = 180;
+constexpr double kNoiseM = 0.02, kMaxRangeM = 20;
+
+double Seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// A scan from a random place that sees at least three walls with half of its beams and stands 20 cm from
+// walls; nothing where this place is no such.
+std::optional<RangeScan> RandomScan(const FloorPlan& plan, const PlanRays& rays, Random* random) {
+  const Vec2 low = plan.Metres(plan.low), high = plan.Metres(plan.high);
+  RangeScan scan;
+  scan.first_angle_rad = -std::numbers::pi / 2;
+  scan.step_rad = std::numbers::pi / kNumBeams;
+  const double x = random->Uniform(low.x(), high.x());
+  const double y = random->Uniform(low.y(), high.y());
+  scan.pose = {{x, y}, random->Uniform(-std::numbers::pi, std::numbers::pi)};
+  std::vector<int32_t> walls;
+  for (int i = 0; i < kNumBeams; ++i) {
+    const double angle = scan.pose.heading_rad + scan.first_angle_rad + i * scan.step_rad;
+    const PlanRays::Hits hits = rays.Cast(scan.pose.position, {std::cos(angle), std::sin(angle)}, kMaxRangeM);
+    double range = 2 * kMaxRangeM;
+    if (hits.size > 0) {
+      walls.push_back(hits.at[0].wall);
+      range = hits.at[0].distance_m + random->Normal(0, kNoiseM);
+      if (range < 0.2) return std::nullopt;
+    }
+    scan.ranges_m.push_back(range);
+  }
+  if (std::ssize(walls) < kNumBeams / 2) return std::nullopt;
+  std::sort(walls.begin(), walls.end());
+  if (std::unique(walls.begin(), walls.end()) - walls.begin() < 3) return std::nullopt;
+  return scan;
+}
+
+// Something in the way of 5 to 30 neighbouring beams, 0.3 to 2.3 m away, until a quarter of all are hidden.
+void HideAQuarter(RangeScan* scan, Random* random) {
+  std::vector<char> hidden(kNumBeams, 0);
+  int num_hidden = 0;
+  while (num_hidden < kNumBeams / 4) {
+    const int first = static_cast<int>(random->Uniform(0, kNumBeams));
+    const int num = static_cast<int>(random->Uniform(5, 30));
+    const double distance = random->Uniform(0.3, 2.3);
+    for (int i = first; i < std::min(kNumBeams, first + num); ++i) {
+      if (hidden[i] != 0 || scan->ranges_m[i] <= distance) continue;
+      scan->ranges_m[i] = distance + random->Normal(0, kNoiseM);
+      hidden[i] = 1;
+      ++num_hidden;
+    }
+  }
+}
+
+bool IsRight(const PlanarPose& found, const PlanarPose& pose) {
+  return (found.position - pose.position).norm() <= 0.25 &&
+         std::abs(WrapAngle(found.heading_rad - pose.heading_rad)) <= 5 * kDegree;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int seed = 1;
+  std::vector<std::string> paths;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--seed" && i + 1 < argc) {
+      seed = std::atoi(argv[++i]);
+    } else {
+      paths.emplace_back(argv[i]);
+    }
+  }
+  std::printf(
+      "| plan | hidden | first right | any right | one solution, determined: right | ms "
+      "|\n|---|---|---|---|---|---|\n");
+  for (const std::string& path : paths) {
+    NoProgress progress;
+    const auto input = decompose_views::ReadPlan(path);
+    if (!input.ok()) {
+      std::fprintf(stderr, "%s\n", input.error().message.c_str());
+      return 1;
+    }
+    const auto cleaned = decompose_views::CleanPlan(*input, {}, progress);
+    if (!cleaned.ok()) {
+      std::fprintf(stderr, "%s\n", cleaned.error().message.c_str());
+      return 1;
+    }
+    Views views;
+    views.plan = cleaned->plan;
+    const auto locator = ScanLocator::Make(views, {});
+    const PlanRays rays(views.plan.walls);
+    for (const bool hide : {false, true}) {
+      Random random(seed);
+      std::vector<RangeScan> scans;
+      while (std::ssize(scans) < kNumPlaces) {
+        auto scan = RandomScan(views.plan, rays, &random);
+        if (!scan) continue;
+        if (hide) HideAQuarter(&*scan, &random);
+        scans.push_back(std::move(*scan));
+      }
+      std::vector<char> first(scans.size(), 0), any(scans.size(), 0), single(scans.size(), 0);
+      std::vector<double> seconds(scans.size());
+      ParallelFor(std::ssize(scans), 0, [&](int64_t i) {
+        const double begin = Seconds();
+        const auto located = locator->Locate(ViewOf(scans[i], {}));
+        seconds[i] = Seconds() - begin;
+        if (!located.ok()) return;
+        for (size_t k = 0; k < located->hypotheses.size(); ++k) {
+          const bool right = IsRight(located->hypotheses[k].pose, scans[i].pose);
+          any[i] |= right ? 1 : 0;
+          if (k == 0) first[i] = right ? 1 : 0;
+        }
+        single[i] = located->hypotheses.size() == 1 && located->hypotheses[0].determined ? 1 : 0;
+      });
+      int num_first = 0, num_any = 0, num_single = 0, num_single_right = 0;
+      double sum = 0;
+      for (size_t i = 0; i < scans.size(); ++i) {
+        num_first += first[i];
+        num_any += any[i];
+        num_single += single[i];
+        num_single_right += single[i] & first[i];
+        sum += seconds[i];
+      }
+      std::printf("| %s | %s | %d of %d | %d | %d of %d | %.1f |\n", path.c_str(),
+                  hide ? "a quarter" : "none", num_first, kNumPlaces, num_any, num_single_right, num_single,
+                  1e3 * sum / kNumPlaces);
+      std::fflush(stdout);
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/geometry/planar_pose.h"
+#include "runtime/beams/wall_field.h"
+#include "runtime/scans/beam.h"
+
+namespace cairn {
+
+struct PoseSearchOptions {
+  // From heading to heading, degrees.
+  double step_deg = 2;
+  // Poses that fit less well than this share of the best are left out.
+  double least_share = 0.7;
+  int max_num_poses = 400;
+  // The search ends after so many windows.
+  int64_t max_num_windows = 4'000'000;
+};
+
+struct FieldPose {
+  PlanarPose pose;
+  double fit = 0;  // of the points, mean of the field: 0 to 1
+};
+
+struct PoseSearchResult {
+  std::vector<FieldPose> poses;  // the best first, 0.35 m or 8 degrees apart
+  int64_t num_windows = 0;       // looked at
+  bool complete = true;          // false: ended by max_num_windows
+};
+
+// Where a beam ended, robot frame, metres.
+struct BeamEnd {
+  Eigen::Vector2d place;
+  std::optional<double> along_rad;  // direction of the wall there, either way, where its neighbours tell
+};
+
+// The ends of beams, in their order, that are `apart_m` from all kept before them.
+std::vector<BeamEnd> EndsApart(const std::vector<Beam>& beams, double apart_m);
+
+// All poses at which ends lie near walls: branch and bound over headings and windows of places.
+// Deterministic.
+PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>& ends,
+                             const PoseSearchOptions& options);
+
+}  // namespace cairn

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "runtime/beams/beam_model.h"
+#include "runtime/beams/pose_search.h"
+#include "runtime/beams/wall_field.h"
+#include "runtime/laser/interpretation_tree.h"
+#include "runtime/scans/read_scans.h"
+
+namespace cairn {
+
+struct ScanLocatorOptions {
+  // Where poses come from that are then judged by all beams: "beams", from the places and headings at which
+  // the ends of beams lie at walls; "vir" and "standard", from pairings of segments with walls
+  // (interpretation_tree.h).
+  std::string search = "beams";
+  // Hypotheses less probable than this share of the first are left out.  REQUIRES: in (0, 1]
+  double least_odds = 0.01;
+  // Of the segments, and of the two searches by them; its `search` and `first_only` do not matter. Tolerances
+  // are those that walls of buildings need, which stand only about where plans say.
+  InterpretationTreeOptions tree{.angle_tolerance_deg = 3,
+                                 .position_tolerance_m = 0.15,
+                                 .length_tolerance_m = 0.4,
+                                 .max_null_ratio = 0.4,
+                                 .one_segment_per_wall = false,
+                                 .sigma_wall_m = 0.06,
+                                 .max_num_nodes = 2e6};
+};
+OptionTable DescribeOptions(ScanLocatorOptions* options);
+
+// Where a scan may have been taken.  Walls of segments, length matched and hidden: of those segments that lie
+// at a wall which is seen from there.
+struct ScanHypothesis : Interpretation {
+  double probability = 0;      // of all hypotheses, and of a place that the plan does not show
+  double explained_ratio = 0;  // of the beams: those that ended at walls of the plan
+};
+
+struct LocatedScan {
+  // The most probable first.  `determined`: false where the place along some direction is not known, as in a
+  // corridor; the covariance there is that of all places which explain the scan as well.
+  std::vector<ScanHypothesis> hypotheses;
+  int64_t num_tried = 0;  // windows of places, or pairings
+  bool complete = true;   // false: the search was ended by its limit
+};
+
+// Finds where a laser scan was taken in a floor plan, without a prior: a search for poses, each moved to
+// where the beams fit best, and judged by all beams: those that end at walls, those that end before them, and
+// those that would have passed through.
+class ScanLocator {
+ public:
+  // `views` outlives this.  By beams, only their plan's walls are read.
+  // Errors: InvalidArgument (options), NoData (no wall).
+  static Result<ScanLocator> Make(const Views& views, const ScanLocatorOptions& options);
+
+  // Deterministic.  Errors: NoData (too few beams that met something; by segments: fewer than two).
+  Result<LocatedScan> Locate(const ScanView& scan) const;
+
+ private:
+  ScanLocator(const Views& views, const ScanLocatorOptions& options);
+  std::vector<PlanarPose> PosesByBeams(const std::vector<Beam>& beams, LocatedScan* located) const;
+  Result<std::vector<PlanarPose>> PosesBySegments(const ScanView& scan, LocatedScan* located) const;
+  PlanarPose RefineInField(const std::vector<BeamEnd>& ends, const PlanarPose& pose) const;
+  void Interpret(const std::vector<ScanSegment>& segments, ScanHypothesis* found) const;
+
+  const FloorPlan* plan_;
+  ScanLocatorOptions options_;
+  std::shared_ptr<const PlanRays> rays_;
+  std::shared_ptr<const WallField> field_;
+  std::shared_ptr<const ViewSearchIndex> index_;  // for searches by segments
+  BeamModel model_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,27 @@
+#include "runtime/beams/wall_cells.h"
+
+#include <limits>
+
+namespace cairn {
+
+using Vec2 = Eigen::Vector2d;
+
+CellGrid GridAround(const std::vector<PlanWall>& walls, double margin_m, double cell_m,
+                    double max_num_cells) {
+  CellGrid grid;
+  Vec2 low = Vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const PlanWall& wall : walls) {
+    low = low.cwiseMin(wall.start).cwiseMin(wall.end);
+    high = high.cwiseMax(wall.start).cwiseMax(wall.end);
+  }
+  if (walls.empty()) low = high = Vec2::Zero();
+  grid.low = low.array() - margin_m;
+  const Vec2 size = (high - low).array() + 2 * margin_m;
+  // Also so that neither side alone is too long.
+  grid.cell_m = std::max({cell_m, std::sqrt(size.prod() / max_num_cells), size.maxCoeff() / max_num_cells});
+  grid.num_columns = static_cast<int>(size.x() / grid.cell_m) + 1;
+  grid.num_rows = static_cast<int>(size.y() / grid.cell_m) + 1;
+  return grid;
+}
+
+}  // namespace cairn

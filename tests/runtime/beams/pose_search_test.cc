@@ -1,0 +1,110 @@
+#include "runtime/beams/pose_search.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/runtime/beams/laser_fixture.h"
+
+namespace cairn {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+double Turn(const PlanarPose& a, const PlanarPose& b) {
+  return std::abs(WrapAngle(a.heading_rad - b.heading_rad));
+}
+
+TEST(EndsApart, KeepTheDirectionOfWalls) {
+  // A wall along y 2 m ahead, seen over 40 degrees, and a point alone to the left.
+  std::vector<Beam> beams;
+  for (int degree = -20; degree <= 20; ++degree) {
+    const Vec2 direction(std::cos(RadOf(degree)), std::sin(RadOf(degree)));
+    beams.push_back({direction, 2 / direction.x(), true});
+  }
+  beams.push_back({{std::cos(RadOf(60)), std::sin(RadOf(60))}, 9, true});
+  beams.push_back({{0, 1}, 20, false});
+  const std::vector<BeamEnd> ends = EndsApart(beams, 0.15);
+  ASSERT_GT(ends.size(), 6u);
+  ASSERT_LT(ends.size(), 12u);
+  for (size_t i = 0; i + 1 < ends.size(); ++i) {
+    ASSERT_TRUE(ends[i].along_rad.has_value());
+    EXPECT_NEAR(std::abs(std::remainder(*ends[i].along_rad - RadOf(90), std::numbers::pi)), 0, 1e-6);
+    for (size_t k = 0; k < i; ++k) EXPECT_GE((ends[i].place - ends[k].place).norm(), 0.15);
+  }
+  EXPECT_FALSE(ends.back().along_rad.has_value());
+  EXPECT_NEAR(ends.back().place.norm(), 9, 1e-9);
+}
+
+TEST(SearchPoses, FindsThePlaceOfAScan) {
+  const std::vector<PlanWall> walls = OddRoom();
+  const WallField field(walls);
+  Random random(2);
+  for (int i = 0; i < 12; ++i) {
+    const double x = random.Uniform(2.5, 3.7), y = random.Uniform(0.5, 4.5);
+    const PlanarPose pose{{x, y}, random.Uniform(-3, 3)};
+    const auto ends = EndsApart(BeamsAt(walls, pose, 0.01, &random), 0.15);
+    const PoseSearchResult result = SearchPoses(field, ends, {});
+    ASSERT_TRUE(result.complete);
+    ASSERT_FALSE(result.poses.empty());
+    EXPECT_TRUE(std::any_of(result.poses.begin(), result.poses.end(), [&](const FieldPose& found) {
+      return (found.pose.position - pose.position).norm() < 0.2 && Turn(found.pose, pose) < RadOf(4);
+    })) << i;
+    for (size_t k = 0; k < result.poses.size(); ++k) {
+      EXPECT_GE(result.poses[k].fit, 0.69 * result.poses[0].fit);
+      EXPECT_LE(result.poses[k].fit, k == 0 ? 1 : result.poses[k - 1].fit);
+      for (size_t other = 0; other < k; ++other) {
+        const PlanarPose &a = result.poses[k].pose, &b = result.poses[other].pose;
+        EXPECT_TRUE((a.position - b.position).norm() >= 0.35 || Turn(a, b) >= RadOf(8));
+      }
+    }
+  }
+}
+
+// Branch and bound leaves out no pose: the best is that of all cells and headings.
+TEST(SearchPoses, FindsTheBestOfAll) {
+  const std::vector<PlanWall> walls = OddRoom();
+  const WallField field(walls);
+  const CellGrid& grid = field.grid();
+  Random random(5);
+  const PlanarPose pose{{5.2, 1.7}, 0.4};
+  const auto ends = EndsApart(BeamsAt(walls, pose, 0.02, &random), 0.3);
+  PoseSearchOptions options;
+  options.step_deg = 10;
+  const PoseSearchResult result = SearchPoses(field, ends, options);
+  double best = 0;
+  for (int heading = 0; heading < 36; ++heading) {
+    const double turn = heading * RadOf(10);
+    for (int row = 0; row < grid.num_rows; ++row) {
+      for (int column = 0; column < grid.num_columns; ++column) {
+        int sum = 0;
+        for (const BeamEnd& end : ends) {
+          const Vec2 at = Eigen::Rotation2Dd(turn) * end.place / grid.cell_m;
+          const int layer = end.along_rad ? WallField::LayerOf(*end.along_rad + turn) : WallField::kAllWalls;
+          sum += field.Best(layer, 0, column + static_cast<int>(std::lround(at.x())),
+                            row + static_cast<int>(std::lround(at.y())));
+        }
+        best = std::max(best, sum / (255.0 * static_cast<double>(ends.size())));
+      }
+    }
+  }
+  ASSERT_FALSE(result.poses.empty());
+  EXPECT_NEAR(result.poses[0].fit, best, 1e-12);
+  EXPECT_LT(result.num_windows, 36 * static_cast<int64_t>(grid.size()) / 10);
+}
+
+TEST(SearchPoses, EndsWhereItMust) {
+  const std::vector<PlanWall> walls = OddRoom();
+  const WallField field(walls);
+  EXPECT_TRUE(SearchPoses(field, {}, {}).poses.empty());
+  // One point lies at a wall from anywhere: as many poses as are asked for.
+  const std::vector<BeamEnd> one = {{{1, 0}, std::nullopt}};
+  EXPECT_EQ(SearchPoses(field, one, {.max_num_poses = 7}).poses.size(), 7u);
+  Random random(1);
+  const auto ends = EndsApart(BeamsAt(walls, {{3, 3}, 1}, 0.01, &random), 0.15);
+  const PoseSearchResult cut = SearchPoses(field, ends, {.max_num_windows = 100});
+  EXPECT_FALSE(cut.complete);
+  EXPECT_TRUE(cut.poses.empty());
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,219 @@
+#include "runtime/beams/scan_locator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/decompose_views/plan_fixture.h"
+#include "tests/runtime/beams/laser_fixture.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+using Vec2 = Eigen::Vector2d;
+
+Views PlanOf(const std::vector<PlanWall>& walls) {
+  Views views;
+  views.plan.walls = walls;
+  return views;
+}
+
+ScanView ScanAt(const std::vector<PlanWall>& walls, const PlanarPose& pose, Random* random) {
+  RangeScan scan;
+  scan.first_angle_rad = RadOf(-90);
+  scan.step_rad = RadOf(1);
+  for (const Beam& beam : BeamsAt(walls, pose, 0.01, random)) scan.ranges_m.push_back(beam.range_m);
+  return ViewOf(scan, {});
+}
+
+bool IsAt(const ScanHypothesis& found, const PlanarPose& pose) {
+  return (found.pose.position - pose.position).norm() < 0.05 &&
+         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) < RadOf(1);
+}
+
+LocatedScan Located(const Views& views, const ScanView& scan, const ScanLocatorOptions& options = {}) {
+  const auto locator = ScanLocator::Make(views, options);
+  EXPECT_TRUE(locator.ok());
+  auto located = locator->Locate(scan);
+  EXPECT_TRUE(located.ok()) << located.error().message;
+  return located.ok() ? std::move(*located) : LocatedScan{};
+}
+
+TEST(ScanLocator, FindsWhereAScanWasTaken) {
+  const Views views = PlanOf(OddRoom());
+  Random random(1);
+  for (int i = 0; i < 12; ++i) {
+    const double x = random.Uniform(2.3, 3.8), y = random.Uniform(0.4, 4.6);
+    const PlanarPose pose{{x, y}, random.Uniform(-3, 3)};
+    const ScanView scan = ScanAt(views.plan.walls, pose, &random);
+    const LocatedScan located = Located(views, scan);
+    ASSERT_FALSE(located.hypotheses.empty());
+    const ScanHypothesis& found = located.hypotheses[0];
+    EXPECT_TRUE(IsAt(found, pose)) << i << ": " << found.pose.position.transpose();
+    EXPECT_TRUE(found.determined);
+    EXPECT_GT(found.probability, 0.5);
+    EXPECT_GT(found.explained_ratio, 0.9);
+    EXPECT_GT(located.num_tried, 1000);
+    EXPECT_TRUE(located.complete);
+    ASSERT_EQ(found.labels.size(), scan.segments.size());
+    EXPECT_EQ(found.num_matched, std::ssize(scan.segments));
+    EXPECT_EQ(found.hidden_length_m, 0);
+    EXPECT_LT(found.rms_m, 0.03);
+    EXPECT_EQ(Located(views, scan, {.least_odds = 1}).hypotheses.size(), 1u);
+    double sum = 0;
+    for (const ScanHypothesis& other : located.hypotheses) sum += other.probability;
+    EXPECT_LE(sum, 1 + 1e-9);
+  }
+}
+
+TEST(ScanLocator, SegmentsHaveTheWallsThatAreSeenFromThere) {
+  const Views views = PlanOf(OddRoom());
+  Random random(1);
+  const PlanarPose pose{{3, 2.5}, 0};
+  ScanView scan = ScanAt(views.plan.walls, pose, &random);
+  const size_t num = scan.segments.size();
+  // Of no wall; and of a wall's place that the pillar hides.
+  scan.segments.push_back({{1, -1.3}, {1, -0.8}, 0.01, 0.01, 10});
+  scan.segments.push_back({{4.4, 2.5}, {3.8, 2.5}, 0.01, 0.01, 10});
+  const LocatedScan located = Located(views, scan);
+  ASSERT_FALSE(located.hypotheses.empty());
+  const ScanHypothesis& found = located.hypotheses[0];
+  ASSERT_TRUE(IsAt(found, pose));
+  EXPECT_EQ(found.num_matched, static_cast<int>(num));
+  EXPECT_EQ(found.labels[num], -1);
+  EXPECT_EQ(found.labels[num + 1], -1);
+  EXPECT_GT(found.hidden_length_m, 0.1);
+  double length = 0;
+  for (size_t i = 0; i < num; ++i) {
+    ASSERT_GE(found.labels[i], 0);
+    length += scan.segments[i].Length();
+    const Vec2 middle = found.pose.FloorFromRobot(scan.segments[i].Middle());
+    const Vec2 start = LabelStart(views.plan, found.labels[i]);
+    const Vec2 along = (LabelEnd(views.plan, found.labels[i]) - start).normalized();
+    EXPECT_LT(std::abs(Cross(along, middle - start)), 0.05);
+  }
+  EXPECT_NEAR(found.matched_length_m, length, 1e-9);
+}
+
+TEST(ScanLocator, WhatStandsInTheWayHidesWalls) {
+  const Views views = PlanOf(OddRoom());
+  int num_right = 0;
+  for (int i = 0; i < 20; ++i) {
+    Random random(i);
+    const PlanarPose pose{{random.Uniform(2.3, 3.8), 2.5}, random.Uniform(-3, 3)};
+    RangeScan scan;
+    scan.first_angle_rad = RadOf(-90);
+    scan.step_rad = RadOf(1);
+    for (const Beam& beam : BeamsAt(views.plan.walls, pose, 0.01, &random))
+      scan.ranges_m.push_back(beam.range_m);
+    for (int k = 60; k < 105; ++k) scan.ranges_m[k] = std::min(scan.ranges_m[k], 0.4 + 0.003 * k);
+    for (int k = 10; k < 20; ++k) scan.ranges_m[k] = 0;  // and some without a range
+    const LocatedScan located = Located(views, ViewOf(scan, {}));
+    num_right += !located.hypotheses.empty() && IsAt(located.hypotheses[0], pose) ? 1 : 0;
+  }
+  EXPECT_GE(num_right, 19);
+}
+
+TEST(ScanLocator, RoomsThatLookAlikeShareTheProbability) {
+  std::vector<PlanWall> walls = OddRoom();
+  for (const PlanWall& wall : OddRoom()) walls.push_back({wall.start + Vec2(20, 0), wall.end + Vec2(20, 0)});
+  const Views views = PlanOf(walls);
+  Random random(4);
+  const PlanarPose pose{{3, 2.5}, 0.3};
+  const LocatedScan located = Located(views, ScanAt(walls, pose, &random));
+  ASSERT_GE(located.hypotheses.size(), 2u);
+  const ScanHypothesis &a = located.hypotheses[0], &b = located.hypotheses[1];
+  EXPECT_NEAR(a.probability + b.probability, 1, 0.05);
+  EXPECT_NEAR(a.probability, 0.5, 0.2);
+  EXPECT_NEAR(std::abs(a.pose.position.x() - b.pose.position.x()), 20, 0.05);
+  EXPECT_TRUE(a.determined);
+  EXPECT_TRUE(b.determined);
+}
+
+TEST(ScanLocator, InACorridorThePlaceAlongItIsNotKnown) {
+  const std::vector<PlanWall> walls = {{{0, 0}, {60, 0}}, {{60, 2}, {0, 2}}};
+  const Views views = PlanOf(walls);
+  Random random(4);
+  const PlanarPose pose{{30, 0.8}, 0};
+  const LocatedScan located = Located(views, ScanAt(walls, pose, &random));
+  ASSERT_FALSE(located.hypotheses.empty());
+  const ScanHypothesis& found = located.hypotheses[0];
+  EXPECT_FALSE(found.determined);
+  EXPECT_GT(std::sqrt(found.covariance(0, 0)), 5);
+  EXPECT_LT(std::sqrt(found.covariance(1, 1)), 0.2);
+  // Two at most: the other way round it is 0.8 m from the other wall.
+  EXPECT_LE(located.hypotheses.size(), 2u);
+  EXPECT_NEAR(found.pose.position.y(), std::abs(WrapAngle(found.pose.heading_rad)) < 1 ? 0.8 : 1.2, 0.05);
+}
+
+TEST(ScanLocator, AScanOfAPlaceThatThePlanDoesNotShowIsNotBelieved) {
+  const Views views = PlanOf(OddRoom());
+  // Of a hall that is larger than all of it.
+  ScanView scan;
+  for (int degree = -90; degree < 90; ++degree)
+    scan.beams.push_back({{std::cos(RadOf(degree)), std::sin(RadOf(degree))},
+                          10 / std::max(std::abs(std::cos(RadOf(degree))), std::abs(std::sin(RadOf(degree)))),
+                          true});
+  const LocatedScan located = Located(views, scan);
+  double sum = 0;
+  for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;
+  EXPECT_GT(sum, 0);
+  EXPECT_LT(sum, 0.5);
+}
+
+TEST(ScanLocator, SegmentsAloneWillDo) {
+  const Views views = PlanOf(OddRoom());
+  Random random(9);
+  const PlanarPose pose{{3.2, 1.4}, -0.8};
+  ScanView scan = ScanAt(views.plan.walls, pose, &random);
+  scan.beams = BeamsTo(scan.segments);
+  const LocatedScan located = Located(views, scan);
+  ASSERT_FALSE(located.hypotheses.empty());
+  EXPECT_TRUE(IsAt(located.hypotheses[0], pose));
+}
+
+TEST(ScanLocator, PosesFromPairingsAreJudgedByBeamsToo) {
+  const Views views = decompose_views::Decomposed(
+                          "0,0,9,0\n9,0,9,6\n9,6,0,6\n0,6,0,0\n4,0,4,2\n4,3,4,6\n4,3.5,6,3.5\n7,3.5,9,3.5\n"
+                          "2,6,2,5.5\n7.5,1,8.2,1.7\n")
+                          .views;
+  Random random(2);
+  const PlanarPose pose{{2, 2.5}, 0.2};
+  const ScanView scan = ScanAt(views.plan.walls, pose, &random);
+  for (const char* search : {"vir", "standard", "beams"}) {
+    const LocatedScan located = Located(views, scan, {.search = search});
+    ASSERT_FALSE(located.hypotheses.empty()) << search;
+    EXPECT_TRUE(IsAt(located.hypotheses[0], pose)) << search;
+    EXPECT_GT(located.hypotheses[0].probability, 0.9) << search;
+    EXPECT_GT(located.num_tried, 0) << search;
+  }
+}
+
+TEST(ScanLocator, SaysTheSameEachTime) {
+  const Views views = PlanOf(OddRoom());
+  Random random(6);
+  const ScanView scan = ScanAt(views.plan.walls, {{5, 2}, 2}, &random);
+  const LocatedScan a = Located(views, scan), b = Located(views, scan);
+  ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
+  for (size_t i = 0; i < a.hypotheses.size(); ++i) {
+    EXPECT_EQ(a.hypotheses[i].pose.position, b.hypotheses[i].pose.position);
+    EXPECT_EQ(a.hypotheses[i].probability, b.hypotheses[i].probability);
+  }
+}
+
+TEST(ScanLocator, RefusesWhatItCannotUse) {
+  const Views views = PlanOf(OddRoom());
+  EXPECT_EQ(ScanLocator::Make(PlanOf({}), {}).error().code, ErrorCode::kNoData);
+  EXPECT_THAT(ScanLocator::Make(views, {.search = "eyes"}).error().message, HasSubstr("search"));
+  EXPECT_EQ(ScanLocator::Make(views, {.least_odds = 0}).error().code, ErrorCode::kInvalidArgument);
+  const auto locator = ScanLocator::Make(views, {});
+  ScanView blind;
+  EXPECT_EQ(locator->Locate(blind).error().code, ErrorCode::kNoData);
+  for (int i = 0; i < 100; ++i) blind.beams.push_back({{1, 0}, 20, i < 2});
+  EXPECT_THAT(locator->Locate(blind).error().message, HasSubstr("2 of 100 beams"));
+  blind.beams[50].met = true;
+  EXPECT_TRUE(locator->Locate(blind).ok());
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,91 @@
+#include "runtime/scans/beam.h"
+
+#include <limits>
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/scans/read_scans.h"
+
+namespace cairn {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+TEST(Beams, OfAScan) {
+  RangeScan scan;
+  scan.first_angle_rad = -std::numbers::pi / 2;
+  scan.step_rad = std::numbers::pi / 4;
+  scan.ranges_m = {1, 0, 2, -1, 30, 4};
+  scan.ranges_m.push_back(std::numeric_limits<double>::quiet_NaN());
+  scan.ranges_m.push_back(std::numeric_limits<double>::infinity());
+  const std::vector<Beam> beams = BeamsOf(scan, 20);
+  ASSERT_EQ(beams.size(), 5u);
+  EXPECT_NEAR((beams[0].End() - Vec2(0, -1)).norm(), 0, 1e-12);
+  EXPECT_NEAR((beams[1].End() - Vec2(2, 0)).norm(), 0, 1e-12);
+  EXPECT_TRUE(beams[0].met && beams[1].met && beams[3].met);
+  EXPECT_FALSE(beams[2].met);
+  EXPECT_EQ(beams[2].range_m, 20);
+  EXPECT_NEAR(beams[2].direction.y(), 1, 1e-12);
+  EXPECT_EQ(beams[4].range_m, 20);
+  // A laser that sees 3 m: 4 is nothing, and so is 3.
+  scan.max_range_m = 4;
+  const std::vector<Beam> near = BeamsOf(scan, 20);
+  EXPECT_FALSE(near[3].met);
+  EXPECT_EQ(near[2].range_m, 4);
+}
+
+TEST(Beams, ToSegments) {
+  // 90 degrees of a wall 2 m to the left, and a short one far ahead.
+  const std::vector<ScanSegment> segments = {{{2, 2}, {-2, 2}}, {{10, -0.1}, {10, 0.1}}};
+  const std::vector<Beam> beams = BeamsTo(segments);
+  ASSERT_EQ(beams.size(), 90u + 5u);
+  for (size_t i = 0; i < beams.size(); ++i) {
+    EXPECT_TRUE(beams[i].met);
+    EXPECT_NEAR(beams[i].direction.norm(), 1, 1e-12);
+    if (i < 90) {
+      EXPECT_NEAR(beams[i].End().y(), 2, 1e-9);
+      EXPECT_LE(std::abs(beams[i].End().x()), 2);
+    } else {
+      EXPECT_NEAR(beams[i].End().x(), 10, 1e-9);
+    }
+  }
+  EXPECT_NEAR(beams[0].direction.dot(beams[1].direction), std::cos(std::numbers::pi / 180), 1e-9);
+}
+
+std::string Log(const std::string& ranges, int num) {
+  return "FLASER " + std::to_string(num) + " " + ranges + " 1 2 0.5 0 0 0 10 host 20\n";
+}
+
+TEST(CarmenLog, TheLargestRangeIsTheLasersWhereItOccursOften) {
+  std::string often, seldom;
+  for (int i = 0; i < 19; ++i) {
+    often += "8.19 ";
+    seldom += "8.19 ";
+  }
+  often += "8.19 2 3";
+  seldom += "8.18 2 3";
+  const auto with = ParseCarmenLog(Log(often, 22), "log");
+  ASSERT_TRUE(with.ok());
+  EXPECT_EQ(with->at(0).max_range_m, 8.19);
+  const auto without = ParseCarmenLog(Log(seldom, 22), "log");
+  EXPECT_TRUE(std::isinf(without->at(0).max_range_m));
+  // In the scan's view: beams of that range met nothing.
+  const auto views = ParseScans(Log(often, 22), "log", {});
+  ASSERT_TRUE(views.ok());
+  EXPECT_EQ(std::count_if(views->at(0).beams.begin(), views->at(0).beams.end(),
+                          [](const Beam& b) { return b.met; }),
+            2);
+  ASSERT_TRUE(views->at(0).logged_pose.has_value());
+  EXPECT_EQ(views->at(0).logged_pose->position, Vec2(1, 2));
+}
+
+TEST(ReadScans, ScansOfSegmentsHaveBeamsToThem) {
+  const auto views = ParseScans("-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n", "scan", {});
+  ASSERT_TRUE(views.ok());
+  EXPECT_GT(views->at(0).beams.size(), 100u);
+}
+
+}  // namespace
+}  // namespace cairn
