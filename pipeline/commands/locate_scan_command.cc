@@ -59,6 +59,8 @@ decompose_views::ViewsOverlay Overlay(const ScanView& scan, const LocatedScan& r
   }
   if (result.hypotheses.empty()) return overlay;
   const ScanHypothesis& best = result.hypotheses[0];
+  for (const Beam& beam : scan.beams)
+    overlay.beams.emplace_back(best.pose.FloorFromRobot(beam.End()), beam.met);
   for (size_t i = 0; i < scan.segments.size(); ++i) {
     overlay.segments.push_back({best.pose.FloorFromRobot(scan.segments[i].start),
                                 best.pose.FloorFromRobot(scan.segments[i].end), best.labels[i] >= 0});

@@ -97,7 +97,22 @@ class Picture {
     svg_.Write("</g>\n");
   }
 
+  // What a scan saw: the area that its beams passed, and where they ended.
+  void DrawBeams(const ViewsOverlay& overlay) {
+    if (overlay.beams.empty() || overlay.robots.empty()) return;
+    const Vec2 at = Px(overlay.robots[0].position);
+    svg_.Write("<g id=\"beams\" fill=\"{}\">\n<polygon fill-opacity=\"0.1\" points=\"{:.1f},{:.1f}",
+               kColours[0], at.x(), at.y());
+    for (const auto& [end, met] : overlay.beams) svg_.Write(" {:.1f},{:.1f}", Px(end).x(), Px(end).y());
+    svg_.Write("\"/>\n");
+    for (const auto& [end, met] : overlay.beams) {
+      if (met) svg_.Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\"/>\n", Px(end).x(), Px(end).y());
+    }
+    svg_.Write("</g>\n");
+  }
+
   void DrawOverlay(const ViewsOverlay& overlay) {
+    DrawBeams(overlay);
     svg_.Write("<g id=\"scan\" stroke-linecap=\"round\">\n");
     for (const ViewsOverlay::Line& line : overlay.segments) {
       const Vec2 a = Px(line.start), b = Px(line.end);

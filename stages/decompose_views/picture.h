@@ -22,6 +22,8 @@ struct ViewsOverlay {
     bool strong = false;  // matched segments; others are drawn thin and dashed
   };
   std::vector<Robot> robots;
+  // Ends of the beams of the first robot, in their order, and whether they met something.
+  std::vector<std::pair<Eigen::Vector2d, bool>> beams;
   std::vector<Line> segments;                       // of a scan
   std::vector<std::vector<Eigen::Vector2d>> paths;  // polylines, an arrow at the end of each
   std::vector<std::string> captions;                // lines of the legend

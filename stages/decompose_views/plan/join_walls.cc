@@ -100,9 +100,42 @@ class Joiner {
     return true;
   }
 
-  void Emit(const Chain& chain, JoinedWalls* result) const {
-    const auto wall = static_cast<int32_t>(result->origins.size());
+  // The number of a chain's wall: that of the chains of the same origin that lie on one line with it, or the
+  // next.
+  int32_t WallOf(const Chain& chain, JoinedWalls* result) {
+    const std::vector<int32_t> vertices(chain.vertices.begin(), chain.vertices.end());
+    for (auto wall = static_cast<int32_t>(result->origins.size()) - 1;
+         wall >= 0 && result->origins[wall] == chain.wall; --wall) {
+      std::vector<int32_t> both = of_walls_[wall];
+      both.insert(both.end(), vertices.begin(), vertices.end());
+      if (!LieOnALine(both)) continue;
+      of_walls_[wall] = std::move(both);
+      return wall;
+    }
     result->origins.push_back(chain.wall);
+    of_walls_.push_back(vertices);
+    return static_cast<int32_t>(result->origins.size()) - 1;
+  }
+
+  // Whether vertices lie within the tolerance of the line between the two that are farthest apart along it.
+  bool LieOnALine(const std::vector<int32_t>& vertices) const {
+    const Vec2 first = Real(vertices.front());
+    Vec2 along = Vec2::Zero();
+    for (const int32_t vertex : vertices) {
+      const Vec2 offset = Real(vertex) - first;
+      if (offset.squaredNorm() > along.squaredNorm()) along = offset;
+    }
+    const auto place = [&](int32_t a, int32_t b) { return Real(a).dot(along) < Real(b).dot(along); };
+    const auto [low, high] = std::minmax_element(vertices.begin(), vertices.end(), place);
+    const Vec2 start = Real(*low), line = Real(*high) - start;
+    return std::all_of(vertices.begin(), vertices.end(), [&](int32_t vertex) {
+      const Vec2 offset = Real(vertex) - start;
+      return std::abs(line.x() * offset.y() - line.y() * offset.x()) <= (tolerance_ + 0.75) * line.norm();
+    });
+  }
+
+  void Emit(const Chain& chain, JoinedWalls* result) {
+    const int32_t wall = WallOf(chain, result);
     int32_t from = chain.vertices.front();
     for (size_t i = 1; i < chain.vertices.size(); ++i) {
       const int32_t vertex = chain.vertices[i];
@@ -124,6 +157,7 @@ class Joiner {
   const bool directed_;
   std::vector<std::vector<int32_t>> at_vertex_;
   std::vector<bool> used_;
+  std::vector<std::vector<int32_t>> of_walls_;  // vertices, by the result's walls
 };
 
 }  // namespace

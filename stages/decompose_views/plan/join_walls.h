@@ -9,8 +9,8 @@ namespace cairn::decompose_views {
 
 struct JoinedWalls {
   std::vector<PlanPiece> pieces;  // of one direction within a wall
-  // Per wall the lowest of those that it was made of; ascending.  One of them may be in several walls: where
-  // its pieces do not lie on one line.
+  // Per wall the lowest of those that it was made of; ascending.  One of them may be that of several walls,
+  // on different lines.
   std::vector<int32_t> origins;
   // Vertices that no piece uses any more, and the wall that they were on.
   std::vector<std::pair<int32_t, int32_t>> removed_vertices;
