@@ -61,7 +61,7 @@ std::optional<RangeScan> RandomScan(const FloorPlan& plan, const PlanRays& rays,
 void HideAQuarter(RangeScan* scan, Random* random) {
   std::vector<char> hidden(kNumBeams, 0);
   int num_hidden = 0;
-  while (num_hidden < kNumBeams / 4) {
+  for (int tries = 0; tries < 10000 && num_hidden < kNumBeams / 4; ++tries) {
     const int first = static_cast<int>(random->Uniform(0, kNumBeams));
     const int num = static_cast<int>(random->Uniform(5, 30));
     const double distance = random->Uniform(0.3, 2.3);
@@ -109,11 +109,15 @@ int main(int argc, char** argv) {
     Views views;
     views.plan = cleaned->plan;
     const auto locator = ScanLocator::Make(views, {});
+    if (!locator.ok()) {
+      std::fprintf(stderr, "%s: %s\n", path.c_str(), locator.error().message.c_str());
+      return 1;
+    }
     const PlanRays rays(views.plan.walls);
     for (const bool hide : {false, true}) {
       Random random(seed);
       std::vector<RangeScan> scans;
-      while (std::ssize(scans) < kNumPlaces) {
+      for (int tries = 0; tries < 1000000 && std::ssize(scans) < kNumPlaces; ++tries) {
         auto scan = RandomScan(views.plan, rays, &random);
         if (!scan) continue;
         if (hide) HideAQuarter(&*scan, &random);
@@ -143,8 +147,8 @@ int main(int argc, char** argv) {
         sum += seconds[i];
       }
       std::printf("| %s | %s | %d of %d | %d | %d of %d | %.1f |\n", path.c_str(),
-                  hide ? "a quarter" : "none", num_first, kNumPlaces, num_any, num_single_right, num_single,
-                  1e3 * sum / kNumPlaces);
+                  hide ? "a quarter" : "none", num_first, static_cast<int>(scans.size()), num_any,
+                  num_single_right, num_single, 1e3 * sum / static_cast<double>(scans.size()));
       std::fflush(stdout);
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Core>
@@ -17,6 +18,15 @@ inline Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
 // The z of the cross product of two vectors in the plane: > 0 where b points left of a.
 inline double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
+}
+
+// Distance of a point from the segment between two others.
+inline double PointToSegment(const Eigen::Vector2d& point, const Eigen::Vector2d& a,
+                             const Eigen::Vector2d& b) {
+  const Eigen::Vector2d along = b - a;
+  const double squared = along.squaredNorm();
+  const double share = squared > 0 ? std::clamp((point - a).dot(along) / squared, 0.0, 1.0) : 0;
+  return (point - a - share * along).norm();
 }
 
 // Two unit vectors, at right angles to each other, that span the plane orthogonal to the unit vector v.

@@ -244,10 +244,8 @@ double FaceLocator::BorderDistance(FaceIdx face, const Vec2& place) const {
   const int64_t first = views_.face_offsets[face], end = views_.face_offsets[face + 1];
   double nearest = -1;
   for (int64_t k = first, before = end - 1; k < end; before = k++) {
-    const Vec2 a = Real(views_.vertices[views_.face_vertices[before]]);
-    const Vec2 along = Real(views_.vertices[views_.face_vertices[k]]) - a;
-    const double t = std::clamp((point - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    const double distance = (point - a - t * along).norm();
+    const double distance = PointToSegment(point, Real(views_.vertices[views_.face_vertices[before]]),
+                                           Real(views_.vertices[views_.face_vertices[k]]));
     if (nearest < 0 || distance < nearest) nearest = distance;
   }
   return nearest * views_.plan.grid_m;

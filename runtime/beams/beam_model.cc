@@ -27,7 +27,7 @@ constexpr double kThrough = 0.1, kThrownBack = 0.9;
 constexpr double kAnywhere = 0.0005, kNothing = 0.05;
 // A wall seen at a small angle: ranges scatter by no more than sigma / this.
 constexpr double kLeastSine = 0.15;
-constexpr double kLargestSigma = 0.5;
+constexpr double kLargestSigma = 0.5;  // metres
 // Walls this far behind a beam's end do not matter, metres.
 constexpr double kBehind = 1;
 
@@ -65,6 +65,7 @@ double BeamModel::WeighWithoutWalls(const std::vector<Beam>& beams) const {
 BeamEvidence BeamModel::Weigh(const std::vector<Beam>& beams, const PlanarPose& pose) const {
   std::array<double, kSigmas.size()> sums{};
   std::array<int, kSigmas.size()> num_explained{};
+  int num_met = 0;
   const Eigen::Rotation2Dd rotation(pose.heading_rad);
   for (const Beam& beam : beams) {
     const Vec2 direction = rotation * beam.direction;
@@ -91,10 +92,10 @@ BeamEvidence BeamModel::Weigh(const std::vector<Beam>& beams, const PlanarPose& 
       sums[i] += std::log(by_walls[i] + unexplained);
       num_explained[i] += by_walls[i] > unexplained ? 1 : 0;
     }
+    num_met += beam.met ? 1 : 0;
   }
   const size_t best = std::max_element(sums.begin(), sums.end()) - sums.begin();
-  return {sums[best], kSigmas[best],
-          beams.empty() ? 0 : static_cast<double>(num_explained[best]) / static_cast<double>(beams.size())};
+  return {sums[best], kSigmas[best], num_met == 0 ? 0 : static_cast<double>(num_explained[best]) / num_met};
 }
 
 void BeamModel::FindMatches(const std::vector<Beam>& beams, double sigma_m, const PlanarPose& pose,
@@ -155,24 +156,33 @@ Eigen::Matrix3d BeamModel::Covariance(const std::vector<Beam>& beams, double sig
                    [](const Match& a, const Match& b) { return a.wall < b.wall; });
   const double precision = 1 / (sigma_m * sigma_m);
   // Known to some hundred metres, whatever the beams say.
-  Eigen::Matrix3d information = Eigen::Vector3d(1e-4, 1e-4, 0.1).asDiagonal();
-  const Eigen::Vector2d wall_precision(1 / std::pow(std::max(1e-6, options_.sigma_wall_m), 2),
-                                       1 / std::pow(std::max(1e-6, RadFromDeg(options_.sigma_wall_deg)), 2));
-  for (size_t i = 0; i < matches.size();) {
-    // The wall's offset and turn are unknowns of their own, eliminated here.
-    Eigen::Matrix2d of_wall = wall_precision.asDiagonal();
-    Eigen::Matrix<double, 3, 2> both = Eigen::Matrix<double, 3, 2>::Zero();
-    const int32_t wall = matches[i].wall;
-    for (; i < matches.size() && matches[i].wall == wall; ++i) {
-      const Match& match = matches[i];
-      const Eigen::Vector2d by_wall(1, match.place);
-      information += precision * match.weight * match.row * match.row.transpose();
-      both += precision * match.weight * match.row * by_wall.transpose();
-      of_wall += precision * match.weight * by_wall * by_wall.transpose();
+  const Eigen::Matrix3d prior = Eigen::Vector3d(1e-4, 1e-4, 0.1).asDiagonal();
+  Eigen::Matrix3d information = prior, scatter = prior;  // of the gradient that Refine brings to zero
+  const Eigen::Matrix2d of_wall =
+      Eigen::Vector2d(std::pow(options_.sigma_wall_m, 2), std::pow(RadFromDeg(options_.sigma_wall_deg), 2))
+          .asDiagonal();
+  for (auto begin = matches.begin(); begin != matches.end();) {
+    const auto end =
+        std::find_if(begin, matches.end(), [&](const Match& match) { return match.wall != begin->wall; });
+    double weights = 0, middle = 0;  // of what is seen of the wall
+    for (auto match = begin; match != end; ++match) {
+      weights += match->weight;
+      middle += match->weight * match->place;
     }
-    information -= both * of_wall.ldlt().solve(both.transpose());
+    middle /= weights;
+    // The wall's offset there, and its turn, move all of its beams.
+    Eigen::Matrix<double, 3, 2> by_wall = Eigen::Matrix<double, 3, 2>::Zero();
+    for (auto match = begin; match != end; ++match) {
+      const Eigen::Vector3d row = precision * match->weight * match->row;
+      information += row * match->row.transpose();
+      scatter += match->weight * row * match->row.transpose();
+      by_wall += row * Eigen::RowVector2d(1, match->place - middle);
+    }
+    scatter += by_wall * of_wall * by_wall.transpose();
+    begin = end;
   }
-  return information.inverse();
+  const Eigen::Matrix3d inverse = information.inverse();
+  return inverse * scatter * inverse;
 }
 
 }  // namespace cairn

@@ -43,7 +43,7 @@ PlanRays::PlanRays(const std::vector<PlanWall>& walls)
   }
   for (size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
   cell_walls_.resize(offsets_.back());
-  std::vector<int32_t> next(offsets_.begin(), offsets_.end() - 1);
+  std::vector<int64_t> next(offsets_.begin(), offsets_.end() - 1);
   for (int32_t i = 0; i < std::ssize(walls); ++i) {
     ForCellsNear(grid_, walls[i], kBorder,
                  [&](int column, int row) { cell_walls_[next[grid_.Index(column, row)]++] = i; });
@@ -82,7 +82,7 @@ PlanRays::Hits PlanRays::Cast(const Vec2& origin, const Vec2& direction, double 
     const int axis = next[0] < next[1] ? 0 : 1;
     const double end = std::min(next[axis], leave);
     const size_t index = grid_.Index(cell[0], cell[1]);
-    for (int32_t i = offsets_[index]; i < offsets_[index + 1]; ++i) {
+    for (int64_t i = offsets_[index]; i < offsets_[index + 1]; ++i) {
       const PlanWall& wall = walls_[cell_walls_[i]];
       const Vec2 to_start = wall.start - origin, along = wall.end - wall.start;
       const double side_a = Cross(direction, to_start), side_b = Cross(direction, wall.end - origin);

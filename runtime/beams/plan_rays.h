@@ -38,7 +38,8 @@ class PlanRays {
  private:
   const std::vector<PlanWall>& walls_;
   const CellGrid grid_;
-  std::vector<int32_t> offsets_, cell_walls_;  // cell i: cell_walls_[offsets_[i] .. offsets_[i + 1])
+  std::vector<int64_t> offsets_;
+  std::vector<int32_t> cell_walls_;  // cell i: cell_walls_[offsets_[i] .. offsets_[i + 1])
 };
 
 }  // namespace cairn

@@ -38,19 +38,22 @@ struct EndCell {
 
 // Neighbours this near to an end tell the direction there, if this much narrower than long.
 constexpr double kNeighbourM = 0.3, kNarrow = 0.15;
-constexpr int kMostNeighbours = 12;  // before and after it
+// Of neighbours nearer to each other one will do, metres.
+constexpr double kNeighboursApartM = 0.025;
 
 // The direction of what stands where beam `i` ended.
 std::optional<double> DirectionAt(const std::vector<Beam>& beams, int i) {
   const Vec2 end = beams[i].End();
-  Vec2 sum = Vec2::Zero();
+  Vec2 sum = Vec2::Zero();  // of offsets from it
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
-  int num = 0;
+  int num = 1;
   for (const int step : {-1, 1}) {
-    for (int k = i + (step > 0 ? 0 : step);
-         k >= 0 && k < std::ssize(beams) && std::abs(k - i) <= kMostNeighbours; k += step) {
+    Vec2 last = Vec2::Zero();
+    for (int k = i + step; k >= 0 && k < std::ssize(beams) && beams[k].met; k += step) {
       const Vec2 offset = beams[k].End() - end;
-      if (!beams[k].met || offset.norm() > kNeighbourM) break;
+      if (offset.norm() > kNeighbourM) break;
+      if ((offset - last).norm() < kNeighboursApartM) continue;
+      last = offset;
       sum += offset;
       squares += offset * offset.transpose();
       ++num;
@@ -58,7 +61,7 @@ std::optional<double> DirectionAt(const std::vector<Beam>& beams, int i) {
   }
   if (num < 3) return std::nullopt;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver((squares - sum * sum.transpose() / num).eval());
-  if (solver.eigenvalues()[0] > kNarrow * kNarrow * solver.eigenvalues()[1]) return std::nullopt;
+  if (solver.eigenvalues()[0] >= kNarrow * kNarrow * solver.eigenvalues()[1]) return std::nullopt;
   return std::atan2(solver.eigenvectors()(1, 1), solver.eigenvectors()(0, 1));
 }
 
@@ -146,10 +149,14 @@ PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>&
   }
   ApartPoses apart;
   int32_t least = 0;
-  while (!windows.empty() && std::ssize(result.poses) < options.max_num_poses) {
+  while (!windows.empty()) {
     const Window window = windows.top();
     windows.pop();
     if (window.bound < least) break;
+    if (std::ssize(result.poses) == options.max_num_poses) {
+      result.complete = false;
+      break;
+    }
     if (window.level == 0) {
       if (result.poses.empty()) least = static_cast<int32_t>(std::ceil(options.least_share * window.bound));
       const PlanarPose pose{grid.Middle(window.column, window.row), WrapAngle(window.heading * step_rad)};
@@ -158,7 +165,7 @@ PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>&
       result.poses.push_back({pose, window.bound / (255.0 * static_cast<double>(ends.size()))});
       continue;
     }
-    if (result.num_windows > options.max_num_windows) {
+    if (result.num_windows * std::ssize(ends) > options.max_num_lookups) {
       result.complete = false;
       break;
     }

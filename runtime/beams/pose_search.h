@@ -18,8 +18,8 @@ struct PoseSearchOptions {
   // Poses that fit less well than this share of the best are left out.
   double least_share = 0.7;
   int max_num_poses = 400;
-  // The search ends after so many windows.
-  int64_t max_num_windows = 4'000'000;
+  // The search ends after so many ends were looked up in windows of places.
+  int64_t max_num_lookups = 400'000'000;
 };
 
 struct FieldPose {
@@ -30,7 +30,7 @@ struct FieldPose {
 struct PoseSearchResult {
   std::vector<FieldPose> poses;  // the best first, 0.35 m or 8 degrees apart
   int64_t num_windows = 0;       // looked at
-  bool complete = true;          // false: ended by max_num_windows
+  bool complete = true;          // false: there may be more poses that fit as well as was asked
 };
 
 // Where a beam ended, robot frame, metres.
@@ -42,8 +42,8 @@ struct BeamEnd {
 // The ends of beams, in their order, that are `apart_m` from all kept before them.
 std::vector<BeamEnd> EndsApart(const std::vector<Beam>& beams, double apart_m);
 
-// All poses at which ends lie near walls: branch and bound over headings and windows of places.
-// Deterministic.
+// Poses at which ends lie near walls, all but those near to better ones: branch and bound over headings and
+// windows of places. Deterministic.
 PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>& ends,
                              const PoseSearchOptions& options);
 

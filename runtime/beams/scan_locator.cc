@@ -1,10 +1,10 @@
 #include "runtime/beams/scan_locator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <numbers>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -13,6 +13,7 @@
 #include <Eigen/LU>
 
 #include "core/geometry/pose.h"
+#include "core/geometry/vector_geometry.h"
 #include "runtime/beams/pose_search.h"
 #include "runtime/laser/found_interpretations.h"
 #include "runtime/laser/rank_interpretations.h"
@@ -32,10 +33,21 @@ constexpr int kMaxNumBeamsRefined = 180;
 constexpr std::array<double, 2> kRefineSigmas = {0.16, 0.06};
 // Poses this near to a better one are that one.
 constexpr double kSameM = 0.15, kSameRad = 3 * std::numbers::pi / 180;
-// Beams within a sector are one piece of evidence: what stands in one's way stands in that of its neighbours.
+// All beams count as much as there are sectors with one: what stands in one's way stands in that of its
+// neighbours.
 constexpr double kSectorRad = 12 * std::numbers::pi / 180;
 // The place is known where its standard deviation is nowhere larger, metres.
 constexpr double kKnownM = 0.25;
+constexpr double kKnownRad = 10 * std::numbers::pi / 180;  // and the heading
+// Poses along a corridor are one group: this near to a line, and to each other along it, metres; and as
+// likely.
+constexpr double kRowM = 0.3, kRowGapM = 1.5, kRowEvidence = 3;
+// A row counts as many times as it has of these lengths, metres.
+constexpr double kRowUnitM = 1;
+// Ends of beams that are searched with, at most, and beams of which they are chosen.
+constexpr int kMaxNumEnds = 400, kMaxNumBeamsSearched = 2000;
+// A search in larger plans would be coarse, square metres.
+constexpr double kMaxAreaM2 = 5e5;
 constexpr int kMaxNumHypotheses = 50;
 // The best of many poses explains so much better than a plan without walls, in a place that the plan does not
 // show: the logarithm of odds.
@@ -82,43 +94,67 @@ void RemoveTheSame(std::vector<WeighedPose>* poses) {
   *poses = std::move(kept);
 }
 
-// One hypothesis of those that lie where another's place is not known: along a corridor.
-void JoinAlongFreeDirections(std::vector<ScanHypothesis>* hypotheses) {
-  std::vector<ScanHypothesis> joined;
-  std::vector<char> taken(hypotheses->size(), 0);
-  for (size_t i = 0; i < hypotheses->size(); ++i) {
+// The direction in which a place is least known, and its standard deviation, metres.
+std::pair<Vec2, double> LeastKnown(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance.topLeftCorner<2, 2>().eval());
+  return {solver.eigenvectors().col(1), std::sqrt(std::max(0.0, solver.eigenvalues()[1]))};
+}
+
+// Poses of which the beams say the same, in a row along a direction in which the place is not known, as in a
+// corridor; or one pose.
+struct PoseGroup {
+  WeighedPose best;
+  Vec2 along = Vec2::Zero();
+  double low_m = 0, high_m = 0;  // of the row, from the best along it
+};
+
+// Groups of poses, which are the best first.  `covariance_of(pose)`, `weight`: of a beam.
+template <typename CovarianceOf>
+std::vector<PoseGroup> GroupPoses(const std::vector<WeighedPose>& poses, double weight, size_t most,
+                                  CovarianceOf&& covariance_of) {
+  std::vector<PoseGroup> groups;
+  std::vector<char> taken(poses.size(), 0);
+  for (size_t i = 0; i < poses.size() && groups.size() < most; ++i) {
     if (taken[i] != 0) continue;
-    ScanHypothesis found = (*hypotheses)[i];
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
-        found.covariance.topLeftCorner<2, 2>().eval());
-    found.determined = std::sqrt(solver.eigenvalues()[1]) <= kKnownM;
-    if (!found.determined) {
-      Eigen::Matrix3d near = found.covariance;
-      near.diagonal() += Eigen::Vector3d(kSameM * kSameM, kSameM * kSameM, kSameRad * kSameRad);
-      const Eigen::Matrix3d information = near.inverse();
-      const Vec2 along = solver.eigenvectors().col(1);
-      double spread = 0, sum = found.probability;
-      for (size_t k = i + 1; k < hypotheses->size(); ++k) {
-        const ScanHypothesis& other = (*hypotheses)[k];
-        Eigen::Vector3d apart;
-        apart << other.pose.position - found.pose.position,
-            WrapAngle(other.pose.heading_rad - found.pose.heading_rad);
-        if (taken[k] != 0 || apart.dot(information * apart) > 9) continue;
-        taken[k] = 1;
-        sum += other.probability;
-        spread += other.probability * std::pow(along.dot(apart.head<2>()), 2);
+    PoseGroup group{poses[i]};
+    const auto [along, sigma] = LeastKnown(covariance_of(poses[i]));
+    if (sigma > kKnownM) {
+      group.along = along;
+      std::vector<std::pair<double, size_t>> row;  // places along it
+      for (size_t k = i; k < poses.size(); ++k) {
+        const Vec2 apart = poses[k].pose.position - poses[i].pose.position;
+        if (taken[k] == 0 && std::abs(Cross(along, apart)) < kRowM &&
+            std::abs(WrapAngle(poses[k].pose.heading_rad - poses[i].pose.heading_rad)) < 2 * kSameRad &&
+            weight * (poses[i].evidence.log_likelihood - poses[k].evidence.log_likelihood) < kRowEvidence)
+          row.emplace_back(along.dot(apart), k);
       }
-      found.probability = sum;
-      // No less than what its members spread over.
-      const double more = spread / sum - solver.eigenvalues()[1];
-      if (more > 0) found.covariance.topLeftCorner<2, 2>() += more * along * along.transpose();
+      std::sort(row.begin(), row.end());
+      // Those that follow each other, from the best both ways.
+      const auto at =
+          std::find_if(row.begin(), row.end(), [&](const auto& member) { return member.second == i; });
+      auto first = at, last = at;
+      while (first != row.begin() && first->first - std::prev(first)->first < kRowGapM) --first;
+      while (std::next(last) != row.end() && std::next(last)->first - last->first < kRowGapM) ++last;
+      group.low_m = first->first;
+      group.high_m = last->first;
+      for (auto member = first; member <= last; ++member) taken[member->second] = 1;
     }
-    joined.push_back(std::move(found));
+    taken[i] = 1;
+    groups.push_back(group);
   }
-  std::stable_sort(joined.begin(), joined.end(), [](const ScanHypothesis& a, const ScanHypothesis& b) {
-    return a.probability > b.probability;
-  });
-  *hypotheses = std::move(joined);
+  return groups;
+}
+
+// A group's hypothesis: of a row its middle, as uncertain along it as it is long.
+void SpreadAlong(const PoseGroup& group, ScanHypothesis* found) {
+  const auto [along, sigma] = LeastKnown(found->covariance);
+  const double length = group.high_m - group.low_m;
+  found->determined = sigma <= kKnownM && std::sqrt(found->covariance(2, 2)) <= kKnownRad;
+  if (group.along == Vec2::Zero() || sigma <= kKnownM) return;
+  found->pose.position += 0.5 * (group.low_m + group.high_m) * group.along;
+  const double variance = length * length / 12 + kSameM * kSameM;  // of a uniform distribution
+  found->covariance.topLeftCorner<2, 2>() += (variance - sigma * sigma) * along * along.transpose();
+  found->probability *= std::max(1.0, length / kRowUnitM);
 }
 
 }  // namespace
@@ -164,6 +200,14 @@ Result<ScanLocator> ScanLocator::Make(const Views& views, const ScanLocatorOptio
   ScanLocatorOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (views.plan.walls.empty()) return MakeError(ErrorCode::kNoData, "a plan without walls");
+  const Vec2 size = ExtentOf(views.plan.walls);
+  if (!(size.prod() <= kMaxAreaM2)) {
+    return MakeError(
+        ErrorCode::kUnsupported,
+        "the plan's walls lie within {:g} x {:g} m; scans are located in up to {:g} square metres: are "
+        "its coordinates metres? else divide it",
+        size.x(), size.y(), kMaxAreaM2);
+  }
   return ScanLocator(views, options);
 }
 
@@ -199,12 +243,26 @@ PlanarPose ScanLocator::RefineInField(const std::vector<BeamEnd>& ends, const Pl
 
 std::vector<PlanarPose> ScanLocator::PosesByBeams(const std::vector<Beam>& beams,
                                                   LocatedScan* located) const {
-  const std::vector<BeamEnd> ends = EndsApart(beams, kThinM);
+  std::vector<BeamEnd> ends = EndsApart(SomeOf(beams, kMaxNumBeamsSearched), kThinM);
+  if (ends.size() > kMaxNumEnds) {
+    std::vector<BeamEnd> some;
+    for (size_t i = 0; i < kMaxNumEnds; ++i) some.push_back(ends[i * ends.size() / kMaxNumEnds]);
+    ends = std::move(some);
+  }
   const PoseSearchResult found = SearchPoses(*field_, ends, {});
   located->num_tried = found.num_windows;
   located->complete = found.complete;
   std::vector<PlanarPose> poses;
-  for (const FieldPose& pose : found.poses) poses.push_back(RefineInField(ends, pose.pose));
+  const std::vector<Beam> few = SomeOf(beams, kNumFewBeams);
+  for (const FieldPose& pose : found.poses) {
+    // By the walls nearest to ends, or by those that beams meet first: the better, where walls are dense the
+    // second, where the pose is far off the first.
+    const PlanarPose by_ends = RefineInField(ends, pose.pose),
+                     by_beams = model_.Refine(few, kRefineSigmas[0], pose.pose);
+    const bool ends_fit =
+        model_.Weigh(few, by_ends).log_likelihood >= model_.Weigh(few, by_beams).log_likelihood;
+    poses.push_back(ends_fit ? by_ends : by_beams);
+  }
   return poses;
 }
 
@@ -220,7 +278,7 @@ Result<std::vector<PlanarPose>> ScanLocator::PosesBySegments(const ScanView& sca
     located->num_tried += found.num_nodes;
     located->complete = located->complete && found.complete;
     for (const Interpretation& solution : found.solutions) poses.push_back(solution.pose);
-    if (!poses.empty()) break;
+    if (!poses.empty() || ratio == std::max(0.6, ratio)) break;
   }
   return poses;
 }
@@ -266,6 +324,10 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
   } else {
     CAIRN_ASSIGN_OR_RETURN(poses, PosesBySegments(scan, &located));
   }
+  const double weight = WeightOfABeam(scan.beams);
+  const auto covariance_of = [&](const WeighedPose& pose) {
+    return model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
+  };
   // The best by some of the beams, then refined and weighed by all.
   const std::vector<Beam> few = SomeOf(scan.beams, kNumFewBeams);
   const std::vector<Beam> refining = SomeOf(scan.beams, kMaxNumBeamsRefined);
@@ -273,34 +335,49 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
   for (const PlanarPose& pose : poses) weighed.push_back({pose, model_.Weigh(few, pose)});
   BestFirst(&weighed);
   RemoveTheSame(&weighed);
-  if (weighed.size() > kNumRefined) weighed.resize(kNumRefined);
-  for (WeighedPose& pose : weighed) {
+  const double few_weight = WeightOfABeam(few);
+  std::vector<PoseGroup> groups = GroupPoses(weighed, few_weight, kNumRefined, covariance_of);
+  for (PoseGroup& group : groups) {
+    WeighedPose& pose = group.best;
     pose.evidence = model_.Weigh(scan.beams, pose.pose);
     PlanarPose refined = pose.pose;
     for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
     const BeamEvidence evidence = model_.Weigh(scan.beams, refined);
     if (evidence.log_likelihood > pose.evidence.log_likelihood) pose = {refined, evidence};
   }
-  BestFirst(&weighed);
-  RemoveTheSame(&weighed);
-  const double weight = WeightOfABeam(scan.beams);
-  for (const WeighedPose& pose : weighed) {
+  std::stable_sort(groups.begin(), groups.end(), [](const PoseGroup& a, const PoseGroup& b) {
+    return a.best.evidence.log_likelihood > b.best.evidence.log_likelihood;
+  });
+  const auto is_same = [](const PoseGroup& a, const PoseGroup& b) {
+    return (a.best.pose.position - b.best.pose.position).norm() < kSameM &&
+           std::abs(WrapAngle(a.best.pose.heading_rad - b.best.pose.heading_rad)) < kSameRad;
+  };
+  for (size_t i = 0; i < groups.size(); ++i) {
+    const PoseGroup& group = groups[i];
+    if (std::any_of(groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(i),
+                    [&](const PoseGroup& other) { return is_same(other, group); }))
+      continue;
     ScanHypothesis found;
-    found.pose = pose.pose;
-    found.explained_ratio = pose.evidence.explained_ratio;
+    found.pose = group.best.pose;
+    found.explained_ratio = group.best.evidence.explained_ratio;
     found.probability =
-        std::exp(weight * (pose.evidence.log_likelihood - weighed.front().evidence.log_likelihood));
-    found.covariance = model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
+        std::exp(weight * (group.best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
+    found.covariance = covariance_of(group.best);
+    SpreadAlong(group, &found);
     located.hypotheses.push_back(std::move(found));
   }
   if (located.hypotheses.empty()) return located;
+  std::stable_sort(
+      located.hypotheses.begin(), located.hypotheses.end(),
+      [](const ScanHypothesis& a, const ScanHypothesis& b) { return a.probability > b.probability; });
   const double evidence =
-      weight * (weighed.front().evidence.log_likelihood - model_.WeighWithoutWalls(scan.beams));
-  const double elsewhere = std::exp(kByChance - evidence);
-  JoinAlongFreeDirections(&located.hypotheses);
-  double sum = elsewhere;
+      weight * (groups.front().best.evidence.log_likelihood - model_.WeighWithoutWalls(scan.beams));
+  double sum = std::exp(kByChance - evidence);
   for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;
   const double least = options_.least_odds * located.hypotheses.front().probability;
+  // Where not all were refined, the others are no less likely than the last.
+  if (groups.size() == kNumRefined && located.hypotheses.back().probability >= least)
+    located.complete = false;
   std::erase_if(located.hypotheses, [&](const ScanHypothesis& found) { return found.probability < least; });
   if (located.hypotheses.size() > kMaxNumHypotheses) located.hypotheses.resize(kMaxNumHypotheses);
   for (ScanHypothesis& found : located.hypotheses) {

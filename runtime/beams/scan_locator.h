@@ -28,7 +28,7 @@ struct ScanLocatorOptions {
                                  .length_tolerance_m = 0.4,
                                  .max_null_ratio = 0.4,
                                  .one_segment_per_wall = false,
-                                 .sigma_wall_m = 0.06,
+                                 .sigma_wall_m = 0.04,
                                  .max_num_nodes = 2e6};
 };
 OptionTable DescribeOptions(ScanLocatorOptions* options);

@@ -1,20 +1,35 @@
 #include "runtime/beams/wall_cells.h"
 
 #include <limits>
+#include <utility>
 
 namespace cairn {
 
 using Vec2 = Eigen::Vector2d;
 
-CellGrid GridAround(const std::vector<PlanWall>& walls, double margin_m, double cell_m,
-                    double max_num_cells) {
-  CellGrid grid;
+namespace {
+
+std::pair<Vec2, Vec2> BoxAround(const std::vector<PlanWall>& walls) {
   Vec2 low = Vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const PlanWall& wall : walls) {
     low = low.cwiseMin(wall.start).cwiseMin(wall.end);
     high = high.cwiseMax(wall.start).cwiseMax(wall.end);
   }
   if (walls.empty()) low = high = Vec2::Zero();
+  return {low, high};
+}
+
+}  // namespace
+
+Vec2 ExtentOf(const std::vector<PlanWall>& walls) {
+  const auto [low, high] = BoxAround(walls);
+  return high - low;
+}
+
+CellGrid GridAround(const std::vector<PlanWall>& walls, double margin_m, double cell_m,
+                    double max_num_cells) {
+  CellGrid grid;
+  const auto [low, high] = BoxAround(walls);
   grid.low = low.array() - margin_m;
   const Vec2 size = (high - low).array() + 2 * margin_m;
   // Also so that neither side alone is too long.

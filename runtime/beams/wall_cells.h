@@ -31,6 +31,9 @@ struct CellGrid {
   }
 };
 
+// Width and height of the box around walls, metres; NaN or infinite where one of theirs is.
+Eigen::Vector2d ExtentOf(const std::vector<PlanWall>& walls);
+
 // The grid around walls, `margin_m` wider, of cells of `cell_m`, or larger ones where more than
 // `max_num_cells` would be needed.
 CellGrid GridAround(const std::vector<PlanWall>& walls, double margin_m, double cell_m, double max_num_cells);

@@ -3,6 +3,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/geometry/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
@@ -10,16 +12,9 @@ constexpr double kFieldCellM = 0.1;
 constexpr double kMaxFieldCells = 1 << 21;
 constexpr double kSigmaCells = 1.2;
 constexpr double kReachSigmas = 3.3;  // 255 exp(-3.3^2 / 2) = 1.1
-constexpr double kFieldMarginM = 1;
+constexpr double kFieldMarginM = 2;
 // Directions of a layer: half of the step between layers, and what directions of points are off.
 constexpr double kLayerReach = 37 * std::numbers::pi / 180;
-
-double SquaredDistance(const PlanWall& wall, const Eigen::Vector2d& place) {
-  const Eigen::Vector2d along = wall.end - wall.start;
-  const double length = along.squaredNorm();
-  const double share = length > 0 ? std::clamp(along.dot(place - wall.start) / length, 0.0, 1.0) : 0;
-  return (place - wall.start - share * along).squaredNorm();
-}
 
 }  // namespace
 
@@ -43,7 +38,8 @@ WallField::WallField(const std::vector<PlanWall>& walls)
       if (std::abs(std::remainder(turned, std::numbers::pi)) > kLayerReach) continue;
       ForCellsNear(grid_, walls[i], reach_m_, [&](int column, int row) {
         const size_t index = grid_.Index(column, row);
-        const auto distance = static_cast<float>(SquaredDistance(walls[i], grid_.Middle(column, row)));
+        const auto distance = static_cast<float>(
+            std::pow(PointToSegment(grid_.Middle(column, row), walls[i].start, walls[i].end), 2));
         if (distance > reach_m_ * reach_m_) return;
         of_layer[index] = std::min(of_layer[index], distance);
         if (distance > squared[index] || (distance == squared[index] && nearest_[index] <= i)) return;

@@ -25,13 +25,6 @@ Pairing MakePairing(const FloorPlan& plan, const ScanSegment& segment, LabelIdx 
   return pairing;
 }
 
-double PointToLine(const Vec2& point, const Vec2& from, const Vec2& to) {
-  const Vec2 along = to - from;
-  const double squared = along.squaredNorm();
-  const double share = squared > 0 ? std::clamp((point - from).dot(along) / squared, 0.0, 1.0) : 0;
-  return (point - from - share * along).norm();
-}
-
 double LineToLine(const Pairing& a, const Pairing& b) {
   const Vec2 u = a.to - a.from, v = b.to - b.from;
   const double denominator = Cross(u, v);
@@ -39,8 +32,8 @@ double LineToLine(const Pairing& a, const Pairing& b) {
     const double s = Cross(b.from - a.from, v) / denominator, t = Cross(b.from - a.from, u) / denominator;
     if (s >= 0 && s <= 1 && t >= 0 && t <= 1) return 0;
   }
-  return std::min({PointToLine(a.from, b.from, b.to), PointToLine(a.to, b.from, b.to),
-                   PointToLine(b.from, a.from, a.to), PointToLine(b.to, a.from, a.to)});
+  return std::min({PointToSegment(a.from, b.from, b.to), PointToSegment(a.to, b.from, b.to),
+                   PointToSegment(b.from, a.from, a.to), PointToSegment(b.to, a.from, a.to)});
 }
 
 bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach) {

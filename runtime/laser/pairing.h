@@ -22,8 +22,7 @@ struct Pairing {
 Pairing MakePairing(const FloorPlan& plan, const ScanSegment& segment, LabelIdx label,
                     double length_tolerance_m);
 
-// Distances, metres: of a point from the line between two others, of the places of two pairings.
-double PointToLine(const Eigen::Vector2d& point, const Eigen::Vector2d& from, const Eigen::Vector2d& to);
+// Distance of the places of two pairings, metres.
 double LineToLine(const Pairing& a, const Pairing& b);
 // Whether a pairing's line of places comes within `reach` of a box.
 bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach);

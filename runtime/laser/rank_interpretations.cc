@@ -39,7 +39,7 @@ bool SeesPoint(const FloorPlan& plan, const PlanarPose& pose, const Vec2& point,
     const Vec2 hit = wall.start + (wall.end - wall.start) * (side_a / (side_a - side_b)) - pose.position;
     const double distance = hit.dot(ray) / reach;
     if (distance > 0 && distance < reach - tolerance_m &&
-        PointToLine(point, wall.start, wall.end) > tolerance_m) {
+        PointToSegment(point, wall.start, wall.end) > tolerance_m) {
       return false;
     }
   }

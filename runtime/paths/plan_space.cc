@@ -12,13 +12,6 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-double PointToSegment(const Vec2& point, const Vec2& a, const Vec2& b) {
-  const Vec2 along = b - a;
-  const double squared = along.squaredNorm();
-  const double share = squared > 0 ? std::clamp((point - a).dot(along) / squared, 0.0, 1.0) : 0;
-  return (point - a - share * along).norm();
-}
-
 int Sign(int64_t value) { return value > 0 ? 1 : value < 0 ? -1 : 0; }
 
 // Whether two closed segments, or points, have a point in common.  Exact.

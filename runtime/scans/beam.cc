@@ -34,11 +34,14 @@ std::vector<Beam> BeamsTo(const std::vector<ScanSegment>& segments) {
     const int num = std::max(kLeastInSegment, static_cast<int>(std::abs(turn) / kStepRad));
     // In equal steps of the direction, as a laser has them.
     const Eigen::Vector2d along = segment.end - segment.start;
+    const double farthest = (1 + 1e-9) * std::max(segment.start.norm(), segment.end.norm());
+    const double nearest = (1 - 1e-9) * std::abs(Cross(segment.start, along)) / along.norm();
     for (int i = 0; i < num; ++i) {
       const Eigen::Rotation2Dd rotation((i + 0.5) / num * turn);
       const Eigen::Vector2d direction = (rotation * segment.start).normalized();
       const double range = Cross(segment.start, along) / Cross(direction, along);
-      if (range > 0) beams.push_back({direction, range, true});
+      // Seen along the line itself, a segment has no such point.
+      if (range >= nearest && range <= farthest) beams.push_back({direction, range, true});
     }
   }
   return beams;

@@ -16,11 +16,12 @@ using Points = std::vector<Vec2>;
 // Runs of beams whose points may belong to one surface.
 std::vector<Points> Runs(const RangeScan& scan, const ScanSegmentsOptions& options) {
   std::vector<Points> runs;
+  const double max_range = std::min(options.max_range_m, scan.max_range_m);
   bool open = false;
   double last_range = 0;
   for (size_t i = 0; i < scan.ranges_m.size(); ++i) {
     const double range = scan.ranges_m[i];
-    if (!(range > 0 && range < options.max_range_m)) {
+    if (!(range > 0 && range < max_range)) {
       open = false;
       continue;
     }

@@ -3,18 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/vector_geometry.h"
+
 namespace cairn::sim {
-namespace {
-
-double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-double DistanceToSegment(const Eigen::Vector2d& point, const WallIndex::Wall& wall) {
-  const Eigen::Vector2d along = wall.second - wall.first;
-  const double t = std::clamp((point - wall.first).dot(along) / along.squaredNorm(), 0.0, 1.0);
-  return (point - wall.first - t * along).norm();
-}
-
-}  // namespace
 
 bool Contains(const Polygon& polygon, const Eigen::Vector2d& point) {
   bool inside = false;
@@ -89,8 +80,9 @@ std::vector<WallIndex::Wall> WallIndex::Near(const Eigen::AlignedBox2d& box) con
 bool WallIndex::AnyWithin(const Eigen::Vector2d& point, double distance_m) const {
   const Eigen::Vector2d reach(distance_m, distance_m);
   const std::vector<Wall> walls = Near(Eigen::AlignedBox2d(point - reach, point + reach));
-  return std::any_of(walls.begin(), walls.end(),
-                     [&](const Wall& wall) { return DistanceToSegment(point, wall) <= distance_m; });
+  return std::any_of(walls.begin(), walls.end(), [&](const Wall& wall) {
+    return PointToSegment(point, wall.first, wall.second) <= distance_m;
+  });
 }
 
 }  // namespace cairn::sim

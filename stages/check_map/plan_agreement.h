@@ -21,7 +21,8 @@ namespace cairn::check_map {
 //   scan_first_agrees_ratio, scan_any_agrees_ratio: of these, such where the scan's first, or any, pose is
 //   that of the image's fix, within gross_error_m and gross_error_deg.
 // A place that looks like another has several poses: the first may be the wrong one.  Same figures for any
-// number of threads.  Errors: InvalidArgument (not as many scans as images), Cancelled.
+// number of threads.  Errors: InvalidArgument (not as many scans as images), Cancelled, those of
+// ScanLocator::Make.
 Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
                        const std::vector<HeldOutResult>& images, const std::vector<ScanView>& scans,
                        const CheckMapOptions& options, int num_threads, Progress& progress,

@@ -276,7 +276,7 @@ class Cleaner {
     return pieces;
   }
 
-  // Numbers walls in the order of their pieces', and measures them.
+  // Numbers walls in the order of their pieces' walls, and measures them.
   void MakePlan(const std::vector<GridPoint>& vertices, std::vector<PlanPiece> pieces) {
     FloorPlan& plan = result_.plan;
     plan.vertices = vertices;

@@ -84,15 +84,15 @@ TEST(BeamModel, RefinesAPoseAndSaysHowWellItIsKnown) {
   constexpr int kNumScans = 200;
   for (int i = 0; i < kNumScans; ++i) {
     Random random(i);
-    // Walls that each stand 3 cm and 0.5 degrees off, as the model is told.
+    // Walls that each stand 3 cm and 0.2 degrees off, turned about their middles.
     std::vector<PlanWall> built = room.walls;
     for (PlanWall& wall : built) {
       const Vec2 along = (wall.end - wall.start).normalized(), normal(-along.y(), along.x());
-      const double off = random.Normal(0, 0.03), turn = random.Normal(0, RadOf(0.5)) * wall.Length() / 2;
+      const double off = random.Normal(0, 0.03), turn = random.Normal(0, RadOf(0.2)) * wall.Length() / 2;
       wall.start += (off - turn) * normal;
       wall.end += (off + turn) * normal;
     }
-    const BeamModel model(room.walls, room.rays, {.sigma_wall_m = 0.03, .sigma_wall_deg = 0.5});
+    const BeamModel model(room.walls, room.rays, {.sigma_wall_m = 0.03, .sigma_wall_deg = 0.2});
     const double x = random.Uniform(2.5, 3.5), y = random.Uniform(1, 4);
     const PlanarPose pose{{x, y}, random.Uniform(-3, 3)};
     const std::vector<Beam> beams = BeamsAt(built, pose, 0.02, &random);
@@ -127,6 +127,23 @@ TEST(BeamModel, BeamsOnOneWallShareWhatItIsOff) {
   const Eigen::Matrix3d information = covariance.inverse();
   EXPECT_NEAR(1 / std::sqrt(information(0, 0)), 0.03, 0.002);
   EXPECT_GT(covariance(1, 1), 1000);  // along it nothing is known
+}
+
+// At the end of a long wall its turn is about the part that is seen, not about its middle.
+TEST(BeamModel, AtTheEndOfALongWallThePlaceIsKnownAsWell) {
+  Eigen::Matrix3d covariances[2];
+  for (const bool is_long : {false, true}) {
+    const double length = is_long ? 120 : 8;
+    const std::vector<PlanWall> walls = {{{0, 0}, {length, 0}}, {{0, 0}, {0, length}}};
+    const PlanRays rays(walls);
+    const BeamModel model(walls, rays, {.sigma_wall_m = 0.06, .sigma_wall_deg = 0.8});
+    Random random(2);
+    covariances[is_long] = model.Covariance(BeamsAt(walls, {{2, 2}, RadOf(-135)}, 0.01, &random, 6), 0.02,
+                                            {{2, 2}, RadOf(-135)});
+  }
+  EXPECT_LT(std::sqrt(covariances[1](0, 0)), 0.1);
+  EXPECT_NEAR(std::sqrt(covariances[1](0, 0)), std::sqrt(covariances[0](0, 0)), 0.01);
+  EXPECT_NEAR(std::sqrt(covariances[1](1, 1)), std::sqrt(covariances[0](1, 1)), 0.01);
 }
 
 }  // namespace

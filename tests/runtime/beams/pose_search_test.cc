@@ -35,6 +35,30 @@ TEST(EndsApart, KeepTheDirectionOfWalls) {
   EXPECT_NEAR(ends.back().place.norm(), 9, 1e-9);
 }
 
+TEST(EndsApart, KnowDirectionsOfDenseScansToo) {
+  for (const double step_deg : {1.0, 0.25, 0.05}) {
+    Random random(1);
+    std::vector<Beam> beams;
+    for (double degree = -30; degree <= 30; degree += step_deg) {
+      const Vec2 direction(std::cos(RadOf(degree)), std::sin(RadOf(degree)));
+      beams.push_back({direction, 1 / direction.x() + random.Normal(0, 0.01), true});
+    }
+    const std::vector<BeamEnd> ends = EndsApart(beams, 0.15);
+    ASSERT_GE(ends.size(), 5u);
+    int num_right = 0;
+    for (const BeamEnd& end : ends) {
+      num_right +=
+          end.along_rad && std::abs(std::remainder(*end.along_rad - RadOf(90), std::numbers::pi)) < RadOf(15)
+              ? 1
+              : 0;
+    }
+    EXPECT_GE(num_right, std::ssize(ends) - 1) << step_deg;
+  }
+  // The same place each time has no direction.
+  const std::vector<Beam> same(20, Beam{{1, 0}, 3, true});
+  EXPECT_FALSE(EndsApart(same, 0.15).at(0).along_rad.has_value());
+}
+
 TEST(SearchPoses, FindsThePlaceOfAScan) {
   const std::vector<PlanWall> walls = OddRoom();
   const WallField field(walls);
@@ -99,9 +123,10 @@ TEST(SearchPoses, EndsWhereItMust) {
   // One point lies at a wall from anywhere: as many poses as are asked for.
   const std::vector<BeamEnd> one = {{{1, 0}, std::nullopt}};
   EXPECT_EQ(SearchPoses(field, one, {.max_num_poses = 7}).poses.size(), 7u);
+  EXPECT_FALSE(SearchPoses(field, one, {.max_num_poses = 7}).complete);
   Random random(1);
   const auto ends = EndsApart(BeamsAt(walls, {{3, 3}, 1}, 0.01, &random), 0.15);
-  const PoseSearchResult cut = SearchPoses(field, ends, {.max_num_windows = 100});
+  const PoseSearchResult cut = SearchPoses(field, ends, {.max_num_lookups = 100});
   EXPECT_FALSE(cut.complete);
   EXPECT_TRUE(cut.poses.empty());
 }

@@ -131,19 +131,49 @@ TEST(ScanLocator, RoomsThatLookAlikeShareTheProbability) {
 }
 
 TEST(ScanLocator, InACorridorThePlaceAlongItIsNotKnown) {
-  const std::vector<PlanWall> walls = {{{0, 0}, {60, 0}}, {{60, 2}, {0, 2}}};
-  const Views views = PlanOf(walls);
+  // Whatever its length, it may be either way round: 0.8 m from one wall, or 1.2 m from the other.
+  for (const double length : {45.0, 60.0, 90.0}) {
+    const std::vector<PlanWall> walls = {{{0, 0}, {length, 0}}, {{length, 2}, {0, 2}}};
+    const Views views = PlanOf(walls);
+    Random random(4);
+    const PlanarPose pose{{length / 2, 0.8}, 0};
+    const LocatedScan located = Located(views, ScanAt(walls, pose, &random));
+    ASSERT_EQ(located.hypotheses.size(), 2u) << length;
+    for (const ScanHypothesis& found : located.hypotheses) {
+      EXPECT_FALSE(found.determined);
+      EXPECT_NEAR(found.probability, 0.5, 0.1) << length;
+      // All places from which at least most of 20 m of both walls ahead are seen.
+      EXPECT_GT(std::sqrt(found.covariance(0, 0)), (length - 20) / std::sqrt(12.0));
+      EXPECT_LT(std::sqrt(found.covariance(0, 0)), length / std::sqrt(12.0));
+      EXPECT_LT(std::sqrt(found.covariance(1, 1)), 0.2);
+      EXPECT_NEAR(found.pose.position.y(), std::abs(WrapAngle(found.pose.heading_rad)) < 1 ? 0.8 : 1.2, 0.05);
+    }
+  }
+}
+
+TEST(ScanLocator, CorridorsInOneLineAreTwo) {
+  const std::vector<PlanWall> walls = {
+      {{0, 0}, {30, 0}}, {{30, 2}, {0, 2}}, {{100, 0}, {130, 0}}, {{130, 2}, {100, 2}}};
   Random random(4);
-  const PlanarPose pose{{30, 0.8}, 0};
-  const LocatedScan located = Located(views, ScanAt(walls, pose, &random));
-  ASSERT_FALSE(located.hypotheses.empty());
-  const ScanHypothesis& found = located.hypotheses[0];
-  EXPECT_FALSE(found.determined);
-  EXPECT_GT(std::sqrt(found.covariance(0, 0)), 5);
-  EXPECT_LT(std::sqrt(found.covariance(1, 1)), 0.2);
-  // Two at most: the other way round it is 0.8 m from the other wall.
-  EXPECT_LE(located.hypotheses.size(), 2u);
-  EXPECT_NEAR(found.pose.position.y(), std::abs(WrapAngle(found.pose.heading_rad)) < 1 ? 0.8 : 1.2, 0.05);
+  const LocatedScan located = Located(PlanOf(walls), ScanAt(walls, {{8, 1}, 0}, &random));
+  int num_left = 0, num_right = 0;
+  for (const ScanHypothesis& found : located.hypotheses)
+    ++(found.pose.position.x() < 50 ? num_left : num_right);
+  EXPECT_GE(num_left, 1);
+  EXPECT_GE(num_right, 1);
+}
+
+TEST(ScanLocator, SaysWhereThereMayBeMorePlaces) {
+  // 64 rooms that are the same.
+  std::vector<PlanWall> walls;
+  for (int i = 0; i < 64; ++i) {
+    const Vec2 corner(12.0 * (i % 8), 9.0 * (i / 8));
+    for (const PlanWall& wall : OddRoom()) walls.push_back({wall.start + corner, wall.end + corner});
+  }
+  Random random(4);
+  const LocatedScan located = Located(PlanOf(walls), ScanAt(walls, {{27, 20.5}, 0.3}, &random));
+  EXPECT_FALSE(located.complete);
+  EXPECT_GT(located.hypotheses.size(), 20u);
 }
 
 TEST(ScanLocator, AScanOfAPlaceThatThePlanDoesNotShowIsNotBelieved) {
@@ -206,6 +236,12 @@ TEST(ScanLocator, RefusesWhatItCannotUse) {
   EXPECT_EQ(ScanLocator::Make(PlanOf({}), {}).error().code, ErrorCode::kNoData);
   EXPECT_THAT(ScanLocator::Make(views, {.search = "eyes"}).error().message, HasSubstr("search"));
   EXPECT_EQ(ScanLocator::Make(views, {.least_odds = 0}).error().code, ErrorCode::kInvalidArgument);
+  const Views millimetres = PlanOf({{{0, 0}, {30000, 0}}, {{0, 0}, {0, 20000}}});
+  EXPECT_THAT(ScanLocator::Make(millimetres, {}).error().message, HasSubstr("30000 x 20000 m"));
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(ScanLocator::Make(PlanOf({{{-1e308, 0}, {1e308, 1e308}}}), {}).error().code,
+            ErrorCode::kUnsupported);
+  EXPECT_EQ(ScanLocator::Make(PlanOf({{{0, 0}, {kInfinity, 1}}}), {}).error().code, ErrorCode::kUnsupported);
   const auto locator = ScanLocator::Make(views, {});
   ScanView blind;
   EXPECT_EQ(locator->Locate(blind).error().code, ErrorCode::kNoData);

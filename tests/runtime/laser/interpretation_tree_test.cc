@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/geometry/pose.h"
+#include "core/geometry/vector_geometry.h"
 #include "runtime/laser/pairing.h"
 #include "runtime/laser/place_support.h"
 #include "runtime/laser/view_order.h"
@@ -354,7 +355,7 @@ TEST(StretchesAlong, HoldThePlaceOfEveryNoisyScan) {
         const Vec2 from = LabelStart(flat.views.plan, label), to = LabelEnd(flat.views.plan, label);
         const Vec2 start = pose->FloorFromRobot(segment.start), end = pose->FloorFromRobot(segment.end);
         if ((to - from).dot(end - start) > 0 &&
-            PointToLine(start, from, to) + PointToLine(end, from, to) < 0.15)
+            PointToSegment(start, from, to) + PointToSegment(end, from, to) < 0.15)
           own = label;
       }
       labels.push_back(own);
@@ -398,7 +399,7 @@ TEST(LabelsInOrder, KeepsTheOrderInWhichWallsAreSeen) {
     const Vec2 start = pose.FloorFromRobot(segments[i].start);
     const LabelIdx label = ways()->front()[i];
     const Vec2 from = LabelStart(views.plan, label), to = LabelEnd(views.plan, label);
-    EXPECT_NEAR(PointToLine(start, from, to), 0, 1e-9);
+    EXPECT_NEAR(PointToSegment(start, from, to), 0, 1e-9);
   }
   std::swap(segments[0].start, segments[1].start);
   std::swap(segments[0].end, segments[1].end);

@@ -29,7 +29,7 @@ TEST(Beams, OfAScan) {
   EXPECT_EQ(beams[2].range_m, 20);
   EXPECT_NEAR(beams[2].direction.y(), 1, 1e-12);
   EXPECT_EQ(beams[4].range_m, 20);
-  // A laser that sees 3 m: 4 is nothing, and so is 3.
+  // A laser that sees 4 m.
   scan.max_range_m = 4;
   const std::vector<Beam> near = BeamsOf(scan, 20);
   EXPECT_FALSE(near[3].met);
@@ -52,6 +52,27 @@ TEST(Beams, ToSegments) {
     }
   }
   EXPECT_NEAR(beams[0].direction.dot(beams[1].direction), std::cos(std::numbers::pi / 180), 1e-9);
+}
+
+TEST(Beams, ToASegmentSeenAlongItsLine) {
+  const std::vector<ScanSegment> edge_on = {
+      {{-5.484349462573257, -2.1818310745344851}, {-1.8189796189204108, -0.72364211718983562}},
+      {{1, 1e-13}, {9, -1e-13}}};
+  for (const Beam& beam : BeamsTo(edge_on)) {
+    EXPECT_LT(beam.range_m, 9.1);
+    EXPECT_GT(beam.range_m, 0);
+    EXPECT_NEAR(beam.direction.norm(), 1, 1e-9);
+  }
+}
+
+TEST(ScanSegments, BeamsOfTheLasersLargestRangeAreNoWall) {
+  RangeScan scan;
+  scan.first_angle_rad = -std::numbers::pi / 4;
+  scan.step_rad = std::numbers::pi / 180;
+  scan.ranges_m.assign(90, 8.19);
+  EXPECT_FALSE(FindScanSegments(scan, {}).empty());
+  scan.max_range_m = 8.19;
+  EXPECT_TRUE(FindScanSegments(scan, {}).empty());
 }
 
 std::string Log(const std::string& ranges, int num) {
