@@ -1,5 +1,9 @@
 #include "pipeline/commands/commands.h"
 
+#include <algorithm>
+#include <optional>
+#include <vector>
+
 #include <nlohmann/json.hpp>
 
 #include "core/base/parallel.h"
@@ -92,36 +96,48 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
                          ReadScans(arguments.scans, arguments.segment_options));
   CAIRN_ASSIGN_OR_RETURN(const auto chosen, ChosenScans(arguments, static_cast<int>(scans.size())));
   const auto [first, end] = chosen;
-  CAIRN_ASSIGN_OR_RETURN(const ScanLocator locator, ScanLocator::Make(views, arguments.locator_options));
+  const auto locator = ScanLocator::Make(views, arguments.locator_options);
+  if (!locator.ok())
+    return MakeError(locator.error().code, "{}: {}", arguments.views, locator.error().message);
   const FaceLocator regions(views);
   int64_t num_located = 0;
   environment.progress->Begin("locate-scan", end - first, "scans");
-  for (int i = first; i < end; ++i) {
+  // A batch on all threads, then its lines in order.
+  const int batch_size = 8 * NumThreads(environment.num_threads);
+  for (int begin = first; begin < end; begin += batch_size) {
+    std::vector<std::optional<Result<LocatedScan>>> batch(std::min(batch_size, end - begin));
+    ParallelFor(std::ssize(batch), environment.num_threads, [&](int64_t i) {
+      if (environment.progress->Cancelled()) return;
+      batch[i] = locator->Locate(scans[begin + i]);
+      environment.progress->Advance();
+    });
     if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
-    ordered_json line = {
-        {"scan", i}, {"beams", scans[i].beams.size()}, {"segments", scans[i].segments.size()}};
-    const auto result = locator.Locate(scans[i]);
-    if (!result.ok()) {
-      if (result.error().code != ErrorCode::kNoData || end - first == 1) {
-        return MakeError(result.error().code, "{}: scan {}: {}", arguments.scans, i, result.error().message);
+    for (int i = begin; i < begin + std::ssize(batch); ++i) {
+      const Result<LocatedScan>& result = *batch[i - begin];
+      ordered_json line = {
+          {"scan", i}, {"beams", scans[i].beams.size()}, {"segments", scans[i].segments.size()}};
+      if (!result.ok()) {
+        if (result.error().code != ErrorCode::kNoData || end - first == 1)
+          return MakeError(result.error().code, "{}: scan {}: {}", arguments.scans, i,
+                           result.error().message);
+        line["reason"] = result.error().message;
+        line["solutions"] = ordered_json::array();
+      } else {
+        ordered_json solutions = ordered_json::array();
+        for (const ScanHypothesis& found : result->hypotheses)
+          solutions.push_back(HypothesisJson(found, regions.Find(found.pose.position)));
+        num_located += !result->hypotheses.empty();
+        line["tried"] = result->num_tried;
+        line["complete"] = result->complete;
+        line["solutions"] = std::move(solutions);
+        if (!arguments.svg.empty() && i == first) {
+          CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+              arguments.svg,
+              decompose_views::DrawViews(views, Overlay(scans[i], *result), /*regions=*/false)));
+        }
       }
-      line["reason"] = result.error().message;
-      line["solutions"] = ordered_json::array();
-    } else {
-      ordered_json solutions = ordered_json::array();
-      for (const ScanHypothesis& found : result->hypotheses)
-        solutions.push_back(HypothesisJson(found, regions.Find(found.pose.position)));
-      num_located += !result->hypotheses.empty();
-      line["tried"] = result->num_tried;
-      line["complete"] = result->complete;
-      line["solutions"] = std::move(solutions);
-      if (!arguments.svg.empty() && i == first) {
-        CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
-            arguments.svg, decompose_views::DrawViews(views, Overlay(scans[i], *result), /*regions=*/false)));
-      }
+      *environment.out << JsonText(line) << "\n";
     }
-    *environment.out << JsonText(line) << "\n";
-    environment.progress->Advance();
   }
   environment.progress->End();
   environment.report->in = {{"scans", end - first}};

@@ -48,7 +48,22 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   EXPECT_NEAR(found["solutions"][0]["x"].get<double>(), 1, 0.01);
   EXPECT_NEAR(found["solutions"][0]["y"].get<double>(), 1, 0.01);
   EXPECT_NEAR(found["solutions"][0]["heading_deg"].get<double>(), 0, 0.5);
-  EXPECT_TRUE(fs::exists(Path("scan.svg")));
+  EXPECT_TRUE(found["solutions"][0]["determined"].get<bool>());
+  EXPECT_GT(found["solutions"][0]["probability"].get<double>(), 0.9);
+  EXPECT_THAT(*ReadFile(Path("scan.svg")), HasSubstr("id=\"beams\""));
+  // A log is located by all threads, with the same lines for any number of them.
+  std::string log;
+  for (int scan = 0; scan < 40; ++scan) {
+    log += "FLASER 60";
+    for (int i = 0; i < 60; ++i) log += fmt::format(" {}", 0.9 + 0.02 * ((i * 7 + scan) % 13));
+    log += " 0 0 0 0 0 0 1 host 1\n";
+  }
+  ASSERT_TRUE(WriteFileAtomically(Path("many.log"), log).ok());
+  const ProgramRun one = Run("plan locate views.db many.log --threads 1"),
+                   two = Run("plan locate views.db many.log --threads 2");
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_EQ(std::count(one.out.begin(), one.out.end(), '\n'), 40);
+  EXPECT_EQ(one.out, two.out);
 
   const ProgramRun path = Run("plan path views.db --from 1,1 --to 5,1");
   ASSERT_EQ(path.exit_code, 0) << path.err;
