@@ -32,6 +32,8 @@ TEST(BeamModel, OneBeamAtOneWall) {
               std::log(0.9 * std::exp(-0.2) * density(0.03, 0.04) + 0.0005 + 0.1 * std::exp(-0.197)), 1e-9);
   EXPECT_EQ(met.sigma_m, 0.04);
   EXPECT_EQ(met.explained_ratio, 1);
+  EXPECT_EQ(model.Weigh({{{1, 0}, 2.08, true}}, {}).sigma_m, 0.08);
+  EXPECT_EQ(model.Weigh({{{1, 0}, 2.3, true}}, {}).sigma_m, 0.16);
   // Through it, to something behind.
   const BeamEvidence through = model.Weigh({{{1, 0}, 5, true}}, {});
   EXPECT_NEAR(through.log_likelihood, std::log(0.0005 + 0.1 * 0.1 * std::exp(-0.5)), 1e-9);
@@ -60,6 +62,24 @@ TEST(BeamModel, TheSecondWallIsSeenThroughTheFirst) {
   const double peak = 1 / (0.02 * std::sqrt(2 * std::numbers::pi));
   EXPECT_NEAR(model.Weigh({{{1, 0}, 4, true}}, {}).log_likelihood,
               std::log(0.1 * 0.9 * std::exp(-0.4) * peak + 0.0005 + 0.1 * 0.1 * std::exp(-0.4)), 1e-6);
+}
+
+// Of walls that are near to each other a beam met the nearer one, unless it ended at the other by half a
+// sigma.
+TEST(BeamModel, AWallInTheWayCounts) {
+  const std::vector<PlanWall> walls = {{{2, -1}, {2, 1}}, {{2.08, -1}, {2.08, 1}}};
+  const PlanRays rays(walls);
+  const BeamModel model(walls, rays, {});
+  const auto refined_x = [&](double range) {
+    std::vector<Beam> beams;
+    for (int i = -5; i <= 5; ++i) {
+      const Vec2 direction = Vec2(2, i / 10.0).normalized();
+      beams.push_back({direction, range / direction.x(), true});
+    }
+    return model.Refine(beams, 0.1, {}).position.x();
+  };
+  EXPECT_NEAR(refined_x(2.076), 0.004, 1e-3);
+  EXPECT_NEAR(refined_x(2.05), -0.05, 1e-3);
 }
 
 TEST(BeamModel, IsMostWhereTheScanWasTaken) {

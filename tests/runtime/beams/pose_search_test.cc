@@ -63,6 +63,7 @@ TEST(SearchPoses, FindsThePlaceOfAScan) {
   const std::vector<PlanWall> walls = OddRoom();
   const WallField field(walls);
   Random random(2);
+  double nearest = std::numeric_limits<double>::infinity();  // of two poses of one heading
   for (int i = 0; i < 12; ++i) {
     const double x = random.Uniform(2.5, 3.7), y = random.Uniform(0.5, 4.5);
     const PlanarPose pose{{x, y}, random.Uniform(-3, 3)};
@@ -79,9 +80,11 @@ TEST(SearchPoses, FindsThePlaceOfAScan) {
       for (size_t other = 0; other < k; ++other) {
         const PlanarPose &a = result.poses[k].pose, &b = result.poses[other].pose;
         EXPECT_TRUE((a.position - b.position).norm() >= 0.35 || Turn(a, b) >= RadOf(8));
+        if (Turn(a, b) < RadOf(8)) nearest = std::min(nearest, (a.position - b.position).norm());
       }
     }
   }
+  EXPECT_LT(nearest, 0.45);
 }
 
 // Branch and bound leaves out no pose: the best is that of all cells and headings.
