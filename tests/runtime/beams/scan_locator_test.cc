@@ -50,6 +50,8 @@ TEST(ScanLocator, FindsWhereAScanWasTaken) {
     ASSERT_FALSE(located.hypotheses.empty());
     const ScanHypothesis& found = located.hypotheses[0];
     EXPECT_TRUE(IsAt(found, pose)) << i << ": " << found.pose.position.transpose();
+    EXPECT_LT((found.pose.position - pose.position).norm(), 0.015);
+    EXPECT_LT(std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)), RadOf(0.3));
     EXPECT_TRUE(found.determined);
     EXPECT_GT(found.probability, 0.5);
     EXPECT_GT(found.explained_ratio, 0.9);
@@ -64,6 +66,24 @@ TEST(ScanLocator, FindsWhereAScanWasTaken) {
     for (const ScanHypothesis& other : located.hypotheses) sum += other.probability;
     EXPECT_LE(sum, 1 + 1e-9);
   }
+}
+
+TEST(ScanLocator, ADenseScanOfALargeHall) {
+  // 7,200 beams all around, which end at 800 places along its walls.
+  const std::vector<PlanWall> walls = {{{0, 0}, {31, 0}},  {{31, 0}, {31, 27}}, {{31, 27}, {0, 27}},
+                                       {{0, 27}, {0, 0}},  {{4, 0}, {4, 3}},    {{20, 27}, {20, 22}},
+                                       {{31, 9}, {27, 9}}, {{0, 18}, {2, 20}}};
+  const PlanarPose pose{{13, 11}, 0.7};
+  Random random(1);
+  ScanView scan;
+  for (int i = 0; i < 7200; ++i) {
+    const Vec2 direction(std::cos(RadOf(i / 20.0)), std::sin(RadOf(i / 20.0)));
+    const double range = NearestAlong(walls, pose.position, Eigen::Rotation2Dd(pose.heading_rad) * direction);
+    scan.beams.push_back({direction, range + random.Normal(0, 0.01), true});
+  }
+  const LocatedScan located = Located(PlanOf(walls), scan);
+  ASSERT_FALSE(located.hypotheses.empty());
+  EXPECT_TRUE(IsAt(located.hypotheses[0], pose));
 }
 
 TEST(ScanLocator, SegmentsHaveTheWallsThatAreSeenFromThere) {
