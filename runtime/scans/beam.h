@@ -9,16 +9,6 @@
 
 namespace cairn {
 
-// One beam of a laser.
-struct Beam {
-  Eigen::Vector2d direction;  // robot frame, of length 1
-  double range_m = 0;
-  bool met = false;  // something, at its range; otherwise it came at least so far
-
-  // Where it ended, robot frame, metres.
-  Eigen::Vector2d End() const { return range_m * direction; }
-};
-
 // The beams of a scan; those of `max_range_m` or more, or of the laser's own largest range, met nothing.
 // Those without a range (0, less, NaN) are left out.
 std::vector<Beam> BeamsOf(const RangeScan& scan, double max_range_m);

@@ -8,6 +8,7 @@
 
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "runtime/scans/beam.h"
 
 namespace cairn {
 namespace {

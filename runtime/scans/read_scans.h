@@ -6,7 +6,6 @@
 
 #include "core/base/error.h"
 #include "core/geometry/planar_pose.h"
-#include "runtime/scans/beam.h"
 #include "runtime/scans/scan_segments.h"
 
 namespace cairn {

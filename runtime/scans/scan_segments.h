@@ -10,6 +10,16 @@
 
 namespace cairn {
 
+// One beam of a laser.
+struct Beam {
+  Eigen::Vector2d direction;  // robot frame, of length 1
+  double range_m = 0;
+  bool met = false;  // something, at its range; otherwise it came at least so far
+
+  // Where it ended, robot frame, metres.
+  Eigen::Vector2d End() const { return range_m * direction; }
+};
+
 // A stretch of a wall as a laser saw it, robot frame, metres.  start -> end is counter-clockwise around the
 // robot, so that it sees the left side.
 struct ScanSegment {

@@ -7,6 +7,7 @@
 
 #include "core/base/random.h"
 #include "runtime/laser/interpretation_tree.h"
+#include "runtime/scans/beam.h"
 #include "stages/check_map/plan_agreement.h"
 
 namespace cairn::check_map {

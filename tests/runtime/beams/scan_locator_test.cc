@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/scans/beam.h"
 #include "tests/decompose_views/plan_fixture.h"
 #include "tests/runtime/beams/laser_fixture.h"
 
