@@ -2,11 +2,11 @@
 // and the source's experiment, nodes of both searches, on seven plans of growing size.
 // Plans of up to 10,000 segments, to be decomposed by the program.
 //   views_growth time | plans FOLDER | large FOLDER
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 
+#include "bench/views/scan_places.h"
 #include "core/base/random.h"
 #include "core/files/file.h"
 #include "core/line/memory.h"
@@ -17,10 +17,6 @@ namespace {
 
 using namespace cairn;
 using Vec2 = Eigen::Vector2d;
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // A corridor with rooms of different width and depth on both sides, joined by doors: 8 corners a room.
 std::vector<Vec2> Office(int num_rooms, uint64_t seed) {

@@ -2,7 +2,6 @@
 // the defaults: 180 beams, 2 cm of noise, and the same with a quarter of the beams hidden by what the plan
 // does not show.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <numbers>
@@ -10,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "runtime/beams/scan_locator.h"
@@ -21,13 +21,8 @@ namespace {
 using namespace cairn;
 using Vec2 = Eigen::Vector2d;
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kNumPlaces = 60, kNumBeams = 180;
 constexpr double kNoiseM = 0.02, kMaxRangeM = 20;
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // A scan from a random place that sees at least three walls with half of its beams and stands 20 cm from
 // walls; nothing where this place is no such.
@@ -72,11 +67,6 @@ void HideAQuarter(RangeScan* scan, Random* random) {
       ++num_hidden;
     }
   }
-}
-
-bool IsRight(const PlanarPose& found, const PlanarPose& pose) {
-  return (found.position - pose.position).norm() <= 0.25 &&
-         std::abs(WrapAngle(found.heading_rad - pose.heading_rad)) <= 5 * kDegree;
 }
 
 }  // namespace

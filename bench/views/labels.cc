@@ -1,9 +1,9 @@
 // views_labels NUM_POINTS PLAN...: label sets of regions beside those found by looking around from random
 // points, and what the decomposition takes.
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
+#include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/line/memory.h"
@@ -13,10 +13,6 @@
 namespace {
 
 using namespace cairn;
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 struct Tally {
   int64_t inside = 0, near_border = 0, in_no_region = 0, wrong = 0, wrong_near_border = 0;

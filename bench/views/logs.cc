@@ -2,7 +2,6 @@
 // poses, the other scans localized in it without odometry.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +11,7 @@
 
 #include <Eigen/LU>
 
+#include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/line/memory.h"
 #include "core/plan/views_database.h"
@@ -24,10 +24,6 @@ using namespace cairn;
 using Vec2 = Eigen::Vector2d;
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // One wall of the map: points of all segments that lie on it, as a line with an extent.
 struct MapWall {
@@ -80,8 +76,7 @@ Outcome LocateOne(const ScanLocator& locator, const RangeScan& scan, const ScanS
   outcome.none = located->hypotheses.empty();
   for (size_t k = 0; k < located->hypotheses.size(); ++k) {
     const ScanHypothesis& found = located->hypotheses[k];
-    const bool right = (found.pose.position - scan.pose.position).norm() <= 0.25 &&
-                       std::abs(WrapAngle(found.pose.heading_rad - scan.pose.heading_rad)) <= 5 * kDegree;
+    const bool right = IsRight(found.pose, scan.pose);
     outcome.any = outcome.any || right;
     if (k > 0) continue;
     outcome.first = right;
@@ -189,8 +184,7 @@ int main(int argc, char** argv) {
   for (size_t i = 1; i < scans->size(); i += step) queries.push_back(i);
   std::printf(
       "| search | scans | first right | any right | no solution | one solution, determined: right | tried | "
-      "ms "
-      "|\n|---|---|---|---|---|---|---|---|\n");
+      "ms |\n|---|---|---|---|---|---|---|---|\n");
   std::string more;
   for (const char* search : {"beams", "vir", "standard"}) {
     ScanLocatorOptions locator_options;

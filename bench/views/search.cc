@@ -1,7 +1,6 @@
 // views_search NUM_POSITIONS noise-free|noisy|all PLAN...: nodes of the standard interpretation tree and of
 // the VIR search, and right poses.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -9,6 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/line/memory.h"
 #include "runtime/laser/interpretation_tree.h"
@@ -42,15 +42,6 @@ struct Mean {
     return count > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / count) / (count - 1))) : 0;
   }
 };
-
-bool IsRight(const Interpretation& found, const PlanarPose& pose, double metres, double degrees) {
-  return (found.pose.position - pose.position).norm() <= metres &&
-         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) <= degrees * kDegree;
-}
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // Sets the standard deviations that fits to the simulated points would have.
 void SetSigmas(std::vector<ScanSegment>* segments) {
@@ -115,7 +106,7 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
   for (size_t i = 0; i < all.solutions.size(); ++i) {
     const bool right =
         all.solutions[i].determined
-            ? IsRight(all.solutions[i], *pose, metres, degrees)
+            ? IsRight(all.solutions[i].pose, *pose, metres, degrees)
             : std::abs(WrapAngle(all.solutions[i].pose.heading_rad - pose->heading_rad)) <= degrees * kDegree;
     sample.listed = sample.listed || right;
     sample.first_right = sample.first_right || (i == 0 && right && all.complete);

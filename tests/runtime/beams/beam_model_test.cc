@@ -45,11 +45,11 @@ TEST(BeamModel, OneBeamAtOneWall) {
   EXPECT_NEAR(model.WeighWithoutWalls({{{1, 0}, 5, true}, {{1, 0}, 8, false}}),
               std::log(0.0005 + 0.1 * std::exp(-0.5)) + std::log(0.05 + std::exp(-0.8)), 1e-9);
   // At a small angle a wall scatters ranges more: 30 degrees, twice as much.
-  const double cosine = std::cos(RadOf(60));
+  const double cosine = std::cos(RadFromDeg(60));
   const std::vector<PlanWall> slanted = {{{2, -10}, {2, 10}}};
   const PlanRays slanted_rays(slanted);
   EXPECT_NEAR(BeamModel(slanted, slanted_rays, {})
-                  .Weigh({{{cosine, std::sin(RadOf(60))}, 4.08, true}}, {})
+                  .Weigh({{{cosine, std::sin(RadFromDeg(60))}, 4.08, true}}, {})
                   .log_likelihood,
               std::log(0.9 * std::exp(-0.4) * density(0.08, 0.08) + 0.0005 + 0.1 * 0.1 * std::exp(-0.408)),
               1e-9);
@@ -108,7 +108,7 @@ TEST(BeamModel, RefinesAPoseAndSaysHowWellItIsKnown) {
     std::vector<PlanWall> built = room.walls;
     for (PlanWall& wall : built) {
       const Vec2 along = (wall.end - wall.start).normalized(), normal(-along.y(), along.x());
-      const double off = random.Normal(0, 0.03), turn = random.Normal(0, RadOf(0.2)) * wall.Length() / 2;
+      const double off = random.Normal(0, 0.03), turn = random.Normal(0, RadFromDeg(0.2)) * wall.Length() / 2;
       wall.start += (off - turn) * normal;
       wall.end += (off + turn) * normal;
     }
@@ -117,7 +117,7 @@ TEST(BeamModel, RefinesAPoseAndSaysHowWellItIsKnown) {
     const PlanarPose pose{{x, y}, random.Uniform(-3, 3)};
     const std::vector<Beam> beams = BeamsAt(built, pose, 0.02, &random);
     PlanarPose refined{pose.position + Vec2(random.Normal(0, 0.08), random.Normal(0, 0.08)),
-                       pose.heading_rad + random.Normal(0, RadOf(2))};
+                       pose.heading_rad + random.Normal(0, RadFromDeg(2))};
     for (const double sigma : {0.16, 0.06}) refined = model.Refine(beams, sigma, refined);
     const Eigen::Matrix3d covariance = model.Covariance(beams, 0.04, refined);
     Eigen::Vector3d error;
@@ -143,7 +143,7 @@ TEST(BeamModel, BeamsOnOneWallShareWhatItIsOff) {
     beams.push_back({direction, 2 / direction.x(), true});
   }
   const Eigen::Matrix3d covariance = model.Covariance(beams, 0.02, {});
-  EXPECT_NEAR(std::sqrt(covariance(2, 2)), RadOf(0.8), 0.003);
+  EXPECT_NEAR(std::sqrt(covariance(2, 2)), RadFromDeg(0.8), 0.003);
   const Eigen::Matrix3d information = covariance.inverse();
   EXPECT_NEAR(1 / std::sqrt(information(0, 0)), 0.03, 0.002);
   EXPECT_GT(covariance(1, 1), 1000);  // along it nothing is known
@@ -158,8 +158,8 @@ TEST(BeamModel, AtTheEndOfALongWallThePlaceIsKnownAsWell) {
     const PlanRays rays(walls);
     const BeamModel model(walls, rays, {.sigma_wall_m = 0.06, .sigma_wall_deg = 0.8});
     Random random(2);
-    covariances[is_long] = model.Covariance(BeamsAt(walls, {{2, 2}, RadOf(-135)}, 0.01, &random, 6), 0.02,
-                                            {{2, 2}, RadOf(-135)});
+    covariances[is_long] = model.Covariance(BeamsAt(walls, {{2, 2}, RadFromDeg(-135)}, 0.01, &random, 6),
+                                            0.02, {{2, 2}, RadFromDeg(-135)});
   }
   EXPECT_LT(std::sqrt(covariances[1](0, 0)), 0.1);
   EXPECT_NEAR(std::sqrt(covariances[1](0, 0)), std::sqrt(covariances[0](0, 0)), 0.01);

@@ -5,13 +5,12 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/geometry/pose.h"
 #include "core/geometry/vector_geometry.h"
 #include "core/plan/floor_plan.h"
 #include "runtime/scans/beam.h"
 
 namespace cairn {
-
-inline double RadOf(double degrees) { return degrees * std::numbers::pi / 180; }
 
 // A room of 8 x 5 m with a niche, a pillar and a wall in it: it looks different from everywhere.
 inline std::vector<PlanWall> OddRoom() {
@@ -48,7 +47,7 @@ inline std::vector<Beam> BeamsAt(const std::vector<PlanWall>& walls, const Plana
                                  Random* random, double max_range_m = 20) {
   std::vector<Beam> beams;
   for (int degree = -90; degree < 90; ++degree) {
-    const Eigen::Vector2d direction(std::cos(RadOf(degree)), std::sin(RadOf(degree)));
+    const Eigen::Vector2d direction(std::cos(RadFromDeg(degree)), std::sin(RadFromDeg(degree)));
     const double range = NearestAlong(walls, pose.position, Eigen::Rotation2Dd(pose.heading_rad) * direction);
     const bool met = range < max_range_m;
     beams.push_back({direction, met ? range + random->Normal(0, sigma_m) : max_range_m, met});

@@ -43,7 +43,7 @@ TEST(PlanRays, FindTheFirstWallsThatARayMeets) {
     const PlanRays rays(walls);
     for (int i = 0; i < 300; ++i) {
       const double x = random.Uniform(-5, 25), y = random.Uniform(-5, 35);
-      const double angle = i % 20 == 0 ? RadOf(90.0 * (i / 20 % 4)) : random.Uniform(-3.2, 3.2);
+      const double angle = i % 20 == 0 ? RadFromDeg(90.0 * (i / 20 % 4)) : random.Uniform(-3.2, 3.2);
       const Vec2 direction = i % 20 == 0 ? Vec2(std::round(std::cos(angle)), std::round(std::sin(angle)))
                                          : Vec2(std::cos(angle), std::sin(angle));
       const double reach = i % 3 == 0 ? 1e9 : random.Uniform(0, 12);

@@ -18,17 +18,17 @@ TEST(EndsApart, KeepTheDirectionOfWalls) {
   // A wall along y 2 m ahead, seen over 40 degrees, and a point alone to the left.
   std::vector<Beam> beams;
   for (int degree = -20; degree <= 20; ++degree) {
-    const Vec2 direction(std::cos(RadOf(degree)), std::sin(RadOf(degree)));
+    const Vec2 direction(std::cos(RadFromDeg(degree)), std::sin(RadFromDeg(degree)));
     beams.push_back({direction, 2 / direction.x(), true});
   }
-  beams.push_back({{std::cos(RadOf(60)), std::sin(RadOf(60))}, 9, true});
+  beams.push_back({{std::cos(RadFromDeg(60)), std::sin(RadFromDeg(60))}, 9, true});
   beams.push_back({{0, 1}, 20, false});
   const std::vector<BeamEnd> ends = EndsApart(beams, 0.15);
   ASSERT_GT(ends.size(), 6u);
   ASSERT_LT(ends.size(), 12u);
   for (size_t i = 0; i + 1 < ends.size(); ++i) {
     ASSERT_TRUE(ends[i].along_rad.has_value());
-    EXPECT_NEAR(std::abs(std::remainder(*ends[i].along_rad - RadOf(90), std::numbers::pi)), 0, 1e-6);
+    EXPECT_NEAR(std::abs(std::remainder(*ends[i].along_rad - RadFromDeg(90), std::numbers::pi)), 0, 1e-6);
     for (size_t k = 0; k < i; ++k) EXPECT_GE((ends[i].place - ends[k].place).norm(), 0.15);
   }
   EXPECT_FALSE(ends.back().along_rad.has_value());
@@ -40,17 +40,17 @@ TEST(EndsApart, KnowDirectionsOfDenseScansToo) {
     Random random(1);
     std::vector<Beam> beams;
     for (double degree = -30; degree <= 30; degree += step_deg) {
-      const Vec2 direction(std::cos(RadOf(degree)), std::sin(RadOf(degree)));
+      const Vec2 direction(std::cos(RadFromDeg(degree)), std::sin(RadFromDeg(degree)));
       beams.push_back({direction, 1 / direction.x() + random.Normal(0, 0.01), true});
     }
     const std::vector<BeamEnd> ends = EndsApart(beams, 0.15);
     ASSERT_GE(ends.size(), 5u);
     int num_right = 0;
     for (const BeamEnd& end : ends) {
-      num_right +=
-          end.along_rad && std::abs(std::remainder(*end.along_rad - RadOf(90), std::numbers::pi)) < RadOf(15)
-              ? 1
-              : 0;
+      num_right += end.along_rad && std::abs(std::remainder(*end.along_rad - RadFromDeg(90),
+                                                            std::numbers::pi)) < RadFromDeg(15)
+                       ? 1
+                       : 0;
     }
     EXPECT_GE(num_right, std::ssize(ends) - 1) << step_deg;
   }
@@ -72,15 +72,15 @@ TEST(SearchPoses, FindsThePlaceOfAScan) {
     ASSERT_TRUE(result.complete);
     ASSERT_FALSE(result.poses.empty());
     EXPECT_TRUE(std::any_of(result.poses.begin(), result.poses.end(), [&](const FieldPose& found) {
-      return (found.pose.position - pose.position).norm() < 0.2 && Turn(found.pose, pose) < RadOf(4);
+      return (found.pose.position - pose.position).norm() < 0.2 && Turn(found.pose, pose) < RadFromDeg(4);
     })) << i;
     for (size_t k = 0; k < result.poses.size(); ++k) {
       EXPECT_GE(result.poses[k].fit, 0.69 * result.poses[0].fit);
       EXPECT_LE(result.poses[k].fit, k == 0 ? 1 : result.poses[k - 1].fit);
       for (size_t other = 0; other < k; ++other) {
         const PlanarPose &a = result.poses[k].pose, &b = result.poses[other].pose;
-        EXPECT_TRUE((a.position - b.position).norm() >= 0.35 || Turn(a, b) >= RadOf(8));
-        if (Turn(a, b) < RadOf(8)) nearest = std::min(nearest, (a.position - b.position).norm());
+        EXPECT_TRUE((a.position - b.position).norm() >= 0.35 || Turn(a, b) >= RadFromDeg(8));
+        if (Turn(a, b) < RadFromDeg(8)) nearest = std::min(nearest, (a.position - b.position).norm());
       }
     }
   }
@@ -100,7 +100,7 @@ TEST(SearchPoses, FindsTheBestOfAll) {
   const PoseSearchResult result = SearchPoses(field, ends, options);
   double best = 0;
   for (int heading = 0; heading < 36; ++heading) {
-    const double turn = heading * RadOf(10);
+    const double turn = heading * RadFromDeg(10);
     for (int row = 0; row < grid.num_rows; ++row) {
       for (int column = 0; column < grid.num_columns; ++column) {
         int sum = 0;

@@ -21,15 +21,15 @@ Views PlanOf(const std::vector<PlanWall>& walls) {
 
 ScanView ScanAt(const std::vector<PlanWall>& walls, const PlanarPose& pose, Random* random) {
   RangeScan scan;
-  scan.first_angle_rad = RadOf(-90);
-  scan.step_rad = RadOf(1);
+  scan.first_angle_rad = RadFromDeg(-90);
+  scan.step_rad = RadFromDeg(1);
   for (const Beam& beam : BeamsAt(walls, pose, 0.01, random)) scan.ranges_m.push_back(beam.range_m);
   return ViewOf(scan, {});
 }
 
 bool IsAt(const ScanHypothesis& found, const PlanarPose& pose) {
   return (found.pose.position - pose.position).norm() < 0.05 &&
-         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) < RadOf(1);
+         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) < RadFromDeg(1);
 }
 
 LocatedScan Located(const Views& views, const ScanView& scan, const ScanLocatorOptions& options = {}) {
@@ -52,7 +52,7 @@ TEST(ScanLocator, FindsWhereAScanWasTaken) {
     const ScanHypothesis& found = located.hypotheses[0];
     EXPECT_TRUE(IsAt(found, pose)) << i << ": " << found.pose.position.transpose();
     EXPECT_LT((found.pose.position - pose.position).norm(), 0.015);
-    EXPECT_LT(std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)), RadOf(0.3));
+    EXPECT_LT(std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)), RadFromDeg(0.3));
     EXPECT_TRUE(found.determined);
     EXPECT_GT(found.probability, 0.5);
     EXPECT_GT(found.explained_ratio, 0.9);
@@ -78,7 +78,7 @@ TEST(ScanLocator, ADenseScanOfALargeHall) {
   Random random(1);
   ScanView scan;
   for (int i = 0; i < 7200; ++i) {
-    const Vec2 direction(std::cos(RadOf(i / 20.0)), std::sin(RadOf(i / 20.0)));
+    const Vec2 direction(std::cos(RadFromDeg(i / 20.0)), std::sin(RadFromDeg(i / 20.0)));
     const double range = NearestAlong(walls, pose.position, Eigen::Rotation2Dd(pose.heading_rad) * direction);
     scan.beams.push_back({direction, range + random.Normal(0, 0.01), true});
   }
@@ -123,8 +123,8 @@ TEST(ScanLocator, WhatStandsInTheWayHidesWalls) {
     Random random(i);
     const PlanarPose pose{{random.Uniform(2.3, 3.8), 2.5}, random.Uniform(-3, 3)};
     RangeScan scan;
-    scan.first_angle_rad = RadOf(-90);
-    scan.step_rad = RadOf(1);
+    scan.first_angle_rad = RadFromDeg(-90);
+    scan.step_rad = RadFromDeg(1);
     for (const Beam& beam : BeamsAt(views.plan.walls, pose, 0.01, &random))
       scan.ranges_m.push_back(beam.range_m);
     for (int k = 60; k < 105; ++k) scan.ranges_m[k] = std::min(scan.ranges_m[k], 0.4 + 0.003 * k);
@@ -202,9 +202,10 @@ TEST(ScanLocator, AScanOfAPlaceThatThePlanDoesNotShowIsNotBelieved) {
   // Of a hall that is larger than all of it.
   ScanView scan;
   for (int degree = -90; degree < 90; ++degree)
-    scan.beams.push_back({{std::cos(RadOf(degree)), std::sin(RadOf(degree))},
-                          10 / std::max(std::abs(std::cos(RadOf(degree))), std::abs(std::sin(RadOf(degree)))),
-                          true});
+    scan.beams.push_back(
+        {{std::cos(RadFromDeg(degree)), std::sin(RadFromDeg(degree))},
+         10 / std::max(std::abs(std::cos(RadFromDeg(degree))), std::abs(std::sin(RadFromDeg(degree)))),
+         true});
   const LocatedScan located = Located(views, scan);
   double sum = 0;
   for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;

@@ -72,7 +72,7 @@ TEST(WallField, AWindowHasTheBestOfItsCells) {
 TEST(WallField, LayersHaveTheWallsOfTheirDirection) {
   // One along x, one along y, one at 20 degrees, which two layers have.
   const std::vector<PlanWall> walls = {
-      {{0, 0}, {2, 0}}, {{5, 0}, {5, 2}}, {{8, 0}, {8 + std::cos(RadOf(20)), std::sin(RadOf(20))}}};
+      {{0, 0}, {2, 0}}, {{5, 0}, {5, 2}}, {{8, 0}, {8 + std::cos(RadFromDeg(20)), std::sin(RadFromDeg(20))}}};
   const WallField field(walls);
   const auto has = [&](int layer, int wall) {
     const Eigen::Vector2i cell = field.grid().CellOf(0.5 * (walls[wall].start + walls[wall].end));
@@ -88,12 +88,12 @@ TEST(WallField, LayersHaveTheWallsOfTheirDirection) {
   EXPECT_THAT(layers_of[1], testing::ElementsAre(2, WallField::kAllWalls));
   EXPECT_THAT(layers_of[2], testing::ElementsAre(0, 1, WallField::kAllWalls));
   EXPECT_EQ(WallField::LayerOf(0), 0);
-  EXPECT_EQ(WallField::LayerOf(RadOf(22)), 0);
-  EXPECT_EQ(WallField::LayerOf(RadOf(23)), 1);
-  EXPECT_EQ(WallField::LayerOf(RadOf(90)), 2);
-  EXPECT_EQ(WallField::LayerOf(RadOf(-90)), 2);
-  EXPECT_EQ(WallField::LayerOf(RadOf(170)), 0);
-  EXPECT_EQ(WallField::LayerOf(RadOf(181)), 0);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(22)), 0);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(23)), 1);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(90)), 2);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(-90)), 2);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(170)), 0);
+  EXPECT_EQ(WallField::LayerOf(RadFromDeg(181)), 0);
 }
 
 TEST(CellGrid, LargePlansHaveLargerCells) {
