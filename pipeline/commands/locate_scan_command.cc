@@ -69,12 +69,11 @@ decompose_views::ViewsOverlay Overlay(const ScanView& scan, const LocatedScan& r
     overlay.segments.push_back({best.pose.FloorFromRobot(scan.segments[i].start),
                                 best.pose.FloorFromRobot(scan.segments[i].end), best.labels[i] >= 0});
   }
-  overlay.captions = {
-      fmt::format("{} of {} segments on walls", best.num_matched, scan.segments.size()),
-      fmt::format("{:.0f} % of {} beams explained", 100 * best.explained_ratio, scan.beams.size()),
-      fmt::format("{} {}", result.hypotheses.size(),
-                  result.hypotheses.size() == 1 ? "solution" : "solutions"),
-      fmt::format("probability of the first: {:.3f}", best.probability)};
+  overlay.captions = {fmt::format("{} of {} segments on walls", best.num_matched, scan.segments.size()),
+                      fmt::format("{:.0f} % of beam ends on walls", 100 * best.explained_ratio),
+                      fmt::format("{} {}", result.hypotheses.size(),
+                                  result.hypotheses.size() == 1 ? "solution" : "solutions"),
+                      fmt::format("probability of the first: {:.3f}", best.probability)};
   return overlay;
 }
 

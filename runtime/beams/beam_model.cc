@@ -6,11 +6,11 @@
 #include <limits>
 #include <numbers>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "core/geometry/pose.h"
 #include "core/geometry/vector_geometry.h"
+#include "runtime/beams/pose_step.h"
 
 namespace cairn {
 namespace {
@@ -34,6 +34,7 @@ constexpr double kBehind = 1;
 constexpr int kBeamSteps = 6;
 constexpr double kLeastStep = 1e-5;                        // metres and radians
 constexpr double kLongestStep = 0.2, kLargestTurn = 0.05;  // of one step
+constexpr double kStayingPrior = 1e-4;
 
 double Density(double off, double sigma) {
   return std::exp(-0.5 * off * off / (sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi));
@@ -116,11 +117,7 @@ void BeamModel::FindMatches(const std::vector<Beam>& beams, double sigma_m, cons
       behind += 0.5;
       if (std::abs(off) >= 3 * sigma_m || cost >= least) continue;
       least = cost;
-      const double tukey = 1 - off * off / (9 * sigma_m * sigma_m);
-      best = {hit.wall,
-              off,
-              tukey * tukey,
-              {normal.x(), normal.y(), normal.dot(Vec2(-arm.y(), arm.x()))},
+      best = {hit.wall, off, TukeyWeight(off, 3 * sigma_m), OffsetRow(normal, arm),
               along.dot(pose.position + arm - 0.5 * (wall.start + wall.end))};
     }
     if (std::isfinite(least)) matches->push_back(best);
@@ -132,18 +129,9 @@ PlanarPose BeamModel::Refine(const std::vector<Beam>& beams, double sigma_m, con
   std::vector<Match> matches;
   for (int step = 0; step < kBeamSteps; ++step) {
     FindMatches(beams, sigma_m, refined, &matches);
-    Eigen::Matrix3d information = 1e-4 * Eigen::Matrix3d::Identity();  // what nothing fixes stays
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    for (const Match& match : matches) {
-      information += match.weight * match.row * match.row.transpose();
-      gradient -= match.weight * match.off * match.row;
-    }
-    Eigen::Vector3d change = information.ldlt().solve(gradient);
-    change.head<2>() *= std::min(1.0, kLongestStep / std::max(kLongestStep, change.head<2>().norm()));
-    change[2] = std::clamp(change[2], -kLargestTurn, kLargestTurn);
-    refined.position += change.head<2>();
-    refined.heading_rad = WrapAngle(refined.heading_rad + change[2]);
-    if (change.norm() < kLeastStep) break;
+    PoseStep change(kStayingPrior);
+    for (const Match& match : matches) change.Add(match.weight, match.off, match.row);
+    if (change.Move(kLongestStep, kLargestTurn, &refined) < kLeastStep) break;
   }
   return refined;
 }

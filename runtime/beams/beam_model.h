@@ -13,16 +13,22 @@ namespace cairn {
 struct BeamModelOptions {
   // How far walls stand from where the plan says, each independently: standard deviation of their offset,
   // metres, and of their direction, degrees.
-  double sigma_wall_m = 0.03;
-  double sigma_wall_deg = 0.8;
+  double sigma_wall_m = 0;
+  double sigma_wall_deg = 0;
 };
 
 // What beams say about a pose.
 struct BeamEvidence {
   double log_likelihood = 0;
   double sigma_m = 0;  // of ranges, that under which it is most
-  double explained_ratio =
-      0;  // of the beams: those that are likelier to have met a wall of the plan than not
+  // Of the beams that met something: those that likelier met a wall of the plan than not.
+  double explained_ratio = 0;
+};
+
+// A pose, and what beams say about it.
+struct WeighedPose {
+  PlanarPose pose;
+  BeamEvidence evidence;
 };
 
 // What a laser measures at a pose in a plan: a beam ends at the first wall in its way, or before it at

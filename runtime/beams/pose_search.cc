@@ -10,7 +10,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "core/geometry/pose.h"
+#include "runtime/beams/pose_step.h"
 
 namespace cairn {
 namespace {
@@ -64,6 +64,10 @@ std::optional<double> DirectionAt(const std::vector<Beam>& beams, int i) {
   if (solver.eigenvalues()[0] >= kNarrow * kNarrow * solver.eigenvalues()[1]) return std::nullopt;
   return std::atan2(solver.eigenvectors()(1, 1), solver.eigenvectors()(0, 1));
 }
+
+// Steps of RefineByEnds, and how far one turns; it ends where one is shorter: metres and radians.
+constexpr int kEndSteps = 12;
+constexpr double kLargestEndTurn = 0.1, kLeastEndStep = 1e-4;
 
 // Poses found so far, by place.
 class ApartPoses {
@@ -178,6 +182,27 @@ PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>&
     }
   }
   return result;
+}
+
+PlanarPose RefineByEnds(const WallField& field, const std::vector<PlanWall>& walls,
+                        const std::vector<BeamEnd>& ends, const PlanarPose& pose) {
+  PlanarPose refined = pose;
+  double band = field.reach_m();
+  for (int step = 0; step < kEndSteps; ++step, band = std::max(0.25 * field.reach_m(), 0.8 * band)) {
+    PoseStep change(1e-6);
+    const Eigen::Rotation2Dd rotation(refined.heading_rad);
+    for (const BeamEnd& end : ends) {
+      const Vec2 arm = rotation * end.place, at = refined.position + arm;
+      const int32_t nearest = field.NearestWall(at);
+      if (nearest < 0) continue;
+      const PlanWall& wall = walls[nearest];
+      const Vec2 along = (wall.end - wall.start).normalized(), normal(-along.y(), along.x());
+      const double off = normal.dot(at - wall.start);
+      if (std::abs(off) < band) change.Add(TukeyWeight(off, band), off, OffsetRow(normal, arm));
+    }
+    if (change.Move(band, kLargestEndTurn, &refined) < kLeastEndStep) break;
+  }
+  return refined;
 }
 
 }  // namespace cairn

@@ -43,8 +43,13 @@ struct BeamEnd {
 std::vector<BeamEnd> EndsApart(const std::vector<Beam>& beams, double apart_m);
 
 // Poses at which ends lie near walls, all but those near to better ones: branch and bound over headings and
-// windows of places. Deterministic.
+// windows of places.  Deterministic.
 PoseSearchResult SearchPoses(const WallField& field, const std::vector<BeamEnd>& ends,
                              const PoseSearchOptions& options);
+
+// The pose near to one of these at which ends lie on the walls nearest to them, whether or not these are
+// seen. `walls`: the field's.
+PlanarPose RefineByEnds(const WallField& field, const std::vector<PlanWall>& walls,
+                        const std::vector<BeamEnd>& ends, const PlanarPose& pose);
 
 }  // namespace cairn

@@ -25,7 +25,6 @@ using Vec2 = Eigen::Vector2d;
 
 // Ends of beams are thinned to this distance for the search and the first refinement, metres.
 constexpr double kThinM = 0.15;
-constexpr int kFieldSteps = 12;
 // Poses are first weighed with so many beams; the best with all.
 constexpr int kNumFewBeams = 90, kNumRefined = 40;
 constexpr int kMaxNumBeamsRefined = 180;
@@ -49,6 +48,8 @@ constexpr int kMaxNumEnds = 400, kMaxNumBeamsSearched = 2000;
 // A search in larger plans would be coarse, square metres.
 constexpr double kMaxAreaM2 = 5e5;
 constexpr int kMaxNumHypotheses = 50;
+// Searches by segments that found nothing are tried again with so many of no wall.
+constexpr double kSecondNullRatio = 0.6;
 // The best of many poses explains so much better than a plan without walls, in a place that the plan does not
 // show: the logarithm of odds.
 constexpr double kByChance = 3;
@@ -69,11 +70,10 @@ double WeightOfABeam(const std::vector<Beam>& beams) {
   return std::min(1.0, static_cast<double>(sectors.size()) / static_cast<double>(beams.size()));
 }
 
-// A pose, and what beams say about it.
-struct WeighedPose {
-  PlanarPose pose;
-  BeamEvidence evidence;
-};
+bool AreTheSame(const PlanarPose& a, const PlanarPose& b) {
+  return (a.position - b.position).norm() < kSameM &&
+         std::abs(WrapAngle(a.heading_rad - b.heading_rad)) < kSameRad;
+}
 
 void BestFirst(std::vector<WeighedPose>* poses) {
   std::stable_sort(poses->begin(), poses->end(), [](const WeighedPose& a, const WeighedPose& b) {
@@ -86,8 +86,7 @@ void RemoveTheSame(std::vector<WeighedPose>* poses) {
   std::vector<WeighedPose> kept;
   for (const WeighedPose& pose : *poses) {
     const bool same = std::any_of(kept.begin(), kept.end(), [&](const WeighedPose& other) {
-      return (other.pose.position - pose.pose.position).norm() < kSameM &&
-             std::abs(WrapAngle(other.pose.heading_rad - pose.pose.heading_rad)) < kSameRad;
+      return AreTheSame(other.pose, pose.pose);
     });
     if (!same) kept.push_back(pose);
   }
@@ -211,38 +210,8 @@ Result<ScanLocator> ScanLocator::Make(const Views& views, const ScanLocatorOptio
   return ScanLocator(views, options);
 }
 
-PlanarPose ScanLocator::RefineInField(const std::vector<BeamEnd>& ends, const PlanarPose& pose) const {
-  PlanarPose refined = pose;
-  double band = field_->reach_m();
-  for (int step = 0; step < kFieldSteps; ++step, band = std::max(0.25 * field_->reach_m(), 0.8 * band)) {
-    Eigen::Matrix3d information = 1e-6 * Eigen::Matrix3d::Identity();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    const Eigen::Rotation2Dd rotation(refined.heading_rad);
-    for (const BeamEnd& end : ends) {
-      const Vec2 arm = rotation * end.place, at = refined.position + arm;
-      const int32_t nearest = field_->NearestWall(at);
-      if (nearest < 0) continue;
-      const PlanWall& wall = plan_->walls[nearest];
-      const Vec2 along = (wall.end - wall.start).normalized(), normal(-along.y(), along.x());
-      const double off = normal.dot(at - wall.start);
-      if (std::abs(off) >= band) continue;
-      const double tukey = 1 - off * off / (band * band), weight = tukey * tukey;
-      const Eigen::Vector3d row(normal.x(), normal.y(), normal.dot(Vec2(-arm.y(), arm.x())));
-      information += weight * row * row.transpose();
-      gradient -= weight * off * row;
-    }
-    Eigen::Vector3d change = information.ldlt().solve(gradient);
-    change.head<2>() *= std::min(1.0, band / std::max(band, change.head<2>().norm()));
-    change[2] = std::clamp(change[2], -0.1, 0.1);
-    refined.position += change.head<2>();
-    refined.heading_rad = WrapAngle(refined.heading_rad + change[2]);
-    if (change.norm() < 1e-4) break;
-  }
-  return refined;
-}
-
-std::vector<PlanarPose> ScanLocator::PosesByBeams(const std::vector<Beam>& beams,
-                                                  LocatedScan* located) const {
+std::vector<WeighedPose> ScanLocator::PosesByBeams(const std::vector<Beam>& beams,
+                                                   const std::vector<Beam>& few, LocatedScan* located) const {
   std::vector<BeamEnd> ends = EndsApart(SomeOf(beams, kMaxNumBeamsSearched), kThinM);
   if (ends.size() > kMaxNumEnds) {
     std::vector<BeamEnd> some;
@@ -252,33 +221,32 @@ std::vector<PlanarPose> ScanLocator::PosesByBeams(const std::vector<Beam>& beams
   const PoseSearchResult found = SearchPoses(*field_, ends, {});
   located->num_tried = found.num_windows;
   located->complete = found.complete;
-  std::vector<PlanarPose> poses;
-  const std::vector<Beam> few = SomeOf(beams, kNumFewBeams);
+  std::vector<WeighedPose> poses;
   for (const FieldPose& pose : found.poses) {
     // By the walls nearest to ends, or by those that beams meet first: the better, where walls are dense the
     // second, where the pose is far off the first.
-    const PlanarPose by_ends = RefineInField(ends, pose.pose),
-                     by_beams = model_.Refine(few, kRefineSigmas[0], pose.pose);
-    const bool ends_fit =
-        model_.Weigh(few, by_ends).log_likelihood >= model_.Weigh(few, by_beams).log_likelihood;
+    const WeighedPose by_ends = Weighed(few, RefineByEnds(*field_, plan_->walls, ends, pose.pose)),
+                      by_beams = Weighed(few, model_.Refine(few, kRefineSigmas[0], pose.pose));
+    const bool ends_fit = by_ends.evidence.log_likelihood >= by_beams.evidence.log_likelihood;
     poses.push_back(ends_fit ? by_ends : by_beams);
   }
   return poses;
 }
 
-Result<std::vector<PlanarPose>> ScanLocator::PosesBySegments(const ScanView& scan,
-                                                             LocatedScan* located) const {
-  std::vector<PlanarPose> poses;
+Result<std::vector<WeighedPose>> ScanLocator::PosesBySegments(const ScanView& scan,
+                                                              const std::vector<Beam>& few,
+                                                              LocatedScan* located) const {
+  std::vector<WeighedPose> poses;
   InterpretationTreeOptions options = options_.tree;
   // What stands in a room may be most of what is seen: a second try allows for more of it.
-  for (const double ratio : {options.max_null_ratio, std::max(0.6, options.max_null_ratio)}) {
+  for (const double ratio : {options.max_null_ratio, std::max(kSecondNullRatio, options.max_null_ratio)}) {
     options.max_null_ratio = ratio;
     CAIRN_ASSIGN_OR_RETURN(const InterpretationTreeResult found,
                            SearchInterpretations(*index_, scan.segments, options));
     located->num_tried += found.num_nodes;
     located->complete = located->complete && found.complete;
-    for (const Interpretation& solution : found.solutions) poses.push_back(solution.pose);
-    if (!poses.empty() || ratio == std::max(0.6, ratio)) break;
+    for (const Interpretation& solution : found.solutions) poses.push_back(Weighed(few, solution.pose));
+    if (!poses.empty() || ratio >= kSecondNullRatio) break;
   }
   return poses;
 }
@@ -318,52 +286,42 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
     return MakeError(ErrorCode::kNoData, "{} of {} beams met something; a pose needs at least three", num_met,
                      scan.beams.size());
   }
-  std::vector<PlanarPose> poses;
+  // The best by some of the beams, then refined and weighed by all.
+  const std::vector<Beam> few = SomeOf(scan.beams, kNumFewBeams);
+  std::vector<WeighedPose> weighed;
   if (options_.search == "beams") {
-    poses = PosesByBeams(scan.beams, &located);
+    weighed = PosesByBeams(scan.beams, few, &located);
   } else {
-    CAIRN_ASSIGN_OR_RETURN(poses, PosesBySegments(scan, &located));
+    CAIRN_ASSIGN_OR_RETURN(weighed, PosesBySegments(scan, few, &located));
   }
+  BestFirst(&weighed);
+  RemoveTheSame(&weighed);
   const double weight = WeightOfABeam(scan.beams);
   const auto covariance_of = [&](const WeighedPose& pose) {
     return model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
   };
-  // The best by some of the beams, then refined and weighed by all.
-  const std::vector<Beam> few = SomeOf(scan.beams, kNumFewBeams);
   const std::vector<Beam> refining = SomeOf(scan.beams, kMaxNumBeamsRefined);
-  std::vector<WeighedPose> weighed;
-  for (const PlanarPose& pose : poses) weighed.push_back({pose, model_.Weigh(few, pose)});
-  BestFirst(&weighed);
-  RemoveTheSame(&weighed);
-  const double few_weight = WeightOfABeam(few);
-  std::vector<PoseGroup> groups = GroupPoses(weighed, few_weight, kNumRefined, covariance_of);
+  std::vector<PoseGroup> groups = GroupPoses(weighed, WeightOfABeam(few), kNumRefined, covariance_of);
   for (PoseGroup& group : groups) {
-    WeighedPose& pose = group.best;
-    pose.evidence = model_.Weigh(scan.beams, pose.pose);
-    PlanarPose refined = pose.pose;
+    PlanarPose refined = group.best.pose;
     for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
-    const BeamEvidence evidence = model_.Weigh(scan.beams, refined);
-    if (evidence.log_likelihood > pose.evidence.log_likelihood) pose = {refined, evidence};
+    const WeighedPose before = Weighed(scan.beams, group.best.pose), after = Weighed(scan.beams, refined);
+    group.best = after.evidence.log_likelihood > before.evidence.log_likelihood ? after : before;
   }
   std::stable_sort(groups.begin(), groups.end(), [](const PoseGroup& a, const PoseGroup& b) {
     return a.best.evidence.log_likelihood > b.best.evidence.log_likelihood;
   });
-  const auto is_same = [](const PoseGroup& a, const PoseGroup& b) {
-    return (a.best.pose.position - b.best.pose.position).norm() < kSameM &&
-           std::abs(WrapAngle(a.best.pose.heading_rad - b.best.pose.heading_rad)) < kSameRad;
-  };
-  for (size_t i = 0; i < groups.size(); ++i) {
-    const PoseGroup& group = groups[i];
-    if (std::any_of(groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(i),
-                    [&](const PoseGroup& other) { return is_same(other, group); }))
+  for (auto group = groups.begin(); group != groups.end(); ++group) {
+    if (std::any_of(groups.begin(), group,
+                    [&](const PoseGroup& better) { return AreTheSame(better.best.pose, group->best.pose); }))
       continue;
     ScanHypothesis found;
-    found.pose = group.best.pose;
-    found.explained_ratio = group.best.evidence.explained_ratio;
-    found.probability =
-        std::exp(weight * (group.best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
-    found.covariance = covariance_of(group.best);
-    SpreadAlong(group, &found);
+    found.pose = group->best.pose;
+    found.explained_ratio = group->best.evidence.explained_ratio;
+    found.probability = std::exp(
+        weight * (group->best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
+    found.covariance = covariance_of(group->best);
+    SpreadAlong(*group, &found);
     located.hypotheses.push_back(std::move(found));
   }
   if (located.hypotheses.empty()) return located;

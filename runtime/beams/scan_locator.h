@@ -7,7 +7,6 @@
 #include "core/base/error.h"
 #include "core/options/options.h"
 #include "runtime/beams/beam_model.h"
-#include "runtime/beams/pose_search.h"
 #include "runtime/beams/wall_field.h"
 #include "runtime/laser/interpretation_tree.h"
 #include "runtime/scans/read_scans.h"
@@ -36,8 +35,8 @@ OptionTable DescribeOptions(ScanLocatorOptions* options);
 // Where a scan may have been taken.  Walls of segments, length matched and hidden: of those segments that lie
 // at a wall which is seen from there.
 struct ScanHypothesis : Interpretation {
-  double probability = 0;      // of all hypotheses, and of a place that the plan does not show
-  double explained_ratio = 0;  // of the beams: those that ended at walls of the plan
+  double probability = 0;      // among all hypotheses, and a place that the plan does not show
+  double explained_ratio = 0;  // of the beams that met something: those that ended at walls of the plan
 };
 
 struct LocatedScan {
@@ -45,7 +44,7 @@ struct LocatedScan {
   // corridor; the covariance there is that of all places which explain the scan as well.
   std::vector<ScanHypothesis> hypotheses;
   int64_t num_tried = 0;  // windows of places, or pairings
-  bool complete = true;   // false: the search was ended by its limit
+  bool complete = true;   // false: there may be more hypotheses
 };
 
 // Finds where a laser scan was taken in a floor plan, without a prior: a search for poses, each moved to
@@ -54,7 +53,8 @@ struct LocatedScan {
 class ScanLocator {
  public:
   // `views` outlives this.  By beams, only their plan's walls are read.
-  // Errors: InvalidArgument (options), NoData (no wall).
+  // Errors: InvalidArgument (options), NoData (no wall), Unsupported (a plan of more than 0.5 square
+  // kilometres: of millimetres?).
   static Result<ScanLocator> Make(const Views& views, const ScanLocatorOptions& options);
 
   // Deterministic.  Errors: NoData (too few beams that met something; by segments: fewer than two).
@@ -62,9 +62,14 @@ class ScanLocator {
 
  private:
   ScanLocator(const Views& views, const ScanLocatorOptions& options);
-  std::vector<PlanarPose> PosesByBeams(const std::vector<Beam>& beams, LocatedScan* located) const;
-  Result<std::vector<PlanarPose>> PosesBySegments(const ScanView& scan, LocatedScan* located) const;
-  PlanarPose RefineInField(const std::vector<BeamEnd>& ends, const PlanarPose& pose) const;
+  WeighedPose Weighed(const std::vector<Beam>& beams, const PlanarPose& pose) const {
+    return {pose, model_.Weigh(beams, pose)};
+  }
+  // Where poses come from; weighed by a `few` of the beams.
+  std::vector<WeighedPose> PosesByBeams(const std::vector<Beam>& beams, const std::vector<Beam>& few,
+                                        LocatedScan* located) const;
+  Result<std::vector<WeighedPose>> PosesBySegments(const ScanView& scan, const std::vector<Beam>& few,
+                                                   LocatedScan* located) const;
   void Interpret(const std::vector<ScanSegment>& segments, ScanHypothesis* found) const;
 
   const FloorPlan* plan_;
