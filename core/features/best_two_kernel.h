@@ -47,6 +47,7 @@ struct BestTwoKernel {
 };
 
 inline constexpr int kNumSiftChunks = 32;
+inline constexpr int kMaxChunks = 256;
 // Chunks whose products the kernels for small values, of SIFT alone, sum in 16 bits.
 inline constexpr int kBestTwoPartialChunks = 8;
 
@@ -58,6 +59,7 @@ extern const BestTwoKernel kBestTwoPortable;
 extern const BestTwoKernel kBestTwoAvx2;
 extern const BestTwoKernel kBestTwoAvxVnni;
 extern const BestTwoKernel kBestTwoAvx512Vnni;
+extern const BestTwoKernel kBestTwoAmx;
 extern const BestTwoKernel kBestTwoNeonDot;
 
 }  // namespace cairn

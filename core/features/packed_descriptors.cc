@@ -4,6 +4,8 @@
 
 #if defined(__x86_64__)
 #include <cpuid.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 #elif defined(__aarch64__)
 #include <asm/hwcap.h>
 #include <sys/auxv.h>
@@ -15,6 +17,7 @@ namespace cairn {
 namespace {
 
 static_assert(4 * kNumSiftChunks == kSiftDescriptorDim);
+static_assert(4 * kMaxChunks >= kMaxDescriptorDim);
 constexpr int kNumSubsets = 8;   // sets of values whose products are summed in one 16-bit lane
 constexpr int kSubsetSize = 16;  // in pairs that one instruction multiplies and adds
 
@@ -129,6 +132,27 @@ bool HasAvxVnni() {
   return __builtin_cpu_supports("avx2") && __get_cpuid_count(7, 1, &eax, &ebx, &ecx, &edx) != 0 &&
          (eax & (1u << 4)) != 0;
 }
+
+// Linux lends the registers of tiles, 8 KiB a thread, to programs that ask for them
+// (Documentation/arch/x86/xstate.rst), unless a thread has a signal stack too small for them.
+bool MayUseTiles() {
+  constexpr long kRequestPermission = 0x1023;  // ARCH_REQ_XCOMP_PERM
+  constexpr long kTileData = 18;               // XFEATURE_XTILEDATA
+  return syscall(SYS_arch_prctl, kRequestPermission, kTileData) == 0;
+}
+
+bool HasAvx512() {
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx512vl");
+}
+
+bool HasAmx() {
+  constexpr unsigned kTile = 1u << 24, kInt8 = 1u << 25;
+  unsigned eax = 0, ebx = 0, ecx = 0, edx = 0;
+  return HasAvx512() && __builtin_cpu_supports("avx512vbmi2") &&
+         __get_cpuid_count(7, 0, &eax, &ebx, &ecx, &edx) != 0 && (edx & kTile) != 0 && (edx & kInt8) != 0 &&
+         MayUseTiles();
+}
 #endif
 
 }  // namespace
@@ -143,6 +167,8 @@ std::string_view NameOf(MatchKernel kernel) {
       return "avx_vnni";
     case MatchKernel::kAvx512Vnni:
       return "avx512_vnni";
+    case MatchKernel::kAmx:
+      return "amx";
     case MatchKernel::kNeonDot:
       return "neon_dot";
   }
@@ -154,10 +180,8 @@ bool IsKernelSupported(MatchKernel kernel) {
 #if defined(__x86_64__)
   if (kernel == MatchKernel::kAvx2) return __builtin_cpu_supports("avx2");
   if (kernel == MatchKernel::kAvxVnni) return HasAvxVnni();
-  if (kernel == MatchKernel::kAvx512Vnni) {
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni");
-  }
+  if (kernel == MatchKernel::kAmx) return HasAmx();
+  if (kernel == MatchKernel::kAvx512Vnni) return HasAvx512() && __builtin_cpu_supports("avx512vnni");
 #elif defined(__aarch64__)
   if (kernel == MatchKernel::kNeonDot) return (getauxval(AT_HWCAP) & HWCAP_ASIMDDP) != 0;
 #endif
@@ -166,8 +190,8 @@ bool IsKernelSupported(MatchKernel kernel) {
 
 MatchKernel FastestKernel() {
   static const MatchKernel fastest = [] {
-    for (const MatchKernel kernel :
-         {MatchKernel::kAvx512Vnni, MatchKernel::kAvxVnni, MatchKernel::kAvx2, MatchKernel::kNeonDot}) {
+    for (const MatchKernel kernel : {MatchKernel::kAmx, MatchKernel::kAvx512Vnni, MatchKernel::kAvxVnni,
+                                     MatchKernel::kAvx2, MatchKernel::kNeonDot}) {
       if (IsKernelSupported(kernel)) return kernel;
     }
     return MatchKernel::kPortable;
@@ -177,6 +201,7 @@ MatchKernel FastestKernel() {
 
 const BestTwoKernel& KernelForAll(MatchKernel kernel) {
 #if defined(__x86_64__)
+  if (kernel == MatchKernel::kAmx) return kBestTwoAmx;
   if (kernel == MatchKernel::kAvx512Vnni) return kBestTwoAvx512Vnni;
   if (kernel == MatchKernel::kAvxVnni) return kBestTwoAvxVnni;
   if (kernel == MatchKernel::kAvx2) return kBestTwoAvx2;

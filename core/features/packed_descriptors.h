@@ -12,11 +12,11 @@ namespace cairn {
 struct BestTwoKernel;
 
 // Instruction sets that have a kernel for dot products of descriptors.
-enum class MatchKernel { kPortable, kAvx2, kAvxVnni, kAvx512Vnni, kNeonDot };
+enum class MatchKernel { kPortable, kAvx2, kAvxVnni, kAvx512Vnni, kAmx, kNeonDot };
 inline constexpr std::array kMatchKernels = {MatchKernel::kPortable, MatchKernel::kAvx2,
-                                             MatchKernel::kAvxVnni, MatchKernel::kAvx512Vnni,
-                                             MatchKernel::kNeonDot};
-// "portable", "avx2", "avx_vnni", "avx512_vnni", "neon_dot".
+                                             MatchKernel::kAvxVnni,  MatchKernel::kAvx512Vnni,
+                                             MatchKernel::kAmx,      MatchKernel::kNeonDot};
+// "portable", "avx2", "avx_vnni", "avx512_vnni", "amx", "neon_dot".
 std::string_view NameOf(MatchKernel kernel);
 // Whether this program contains it and this processor can run it.
 bool IsKernelSupported(MatchKernel kernel);
