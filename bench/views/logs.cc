@@ -1,5 +1,6 @@
 // views_logs LOG [MAX_SCANS]: a map of segments built from every second scan of a Carmen log at the log's
-// poses, the other scans localized in it without odometry.
+// poses, the other scans localized in it without odometry; and a robot that wakes up at each of them, and
+// drives on by the log's odometry.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,53 +12,18 @@
 
 #include <Eigen/LU>
 
+#include "bench/views/log_map.h"
 #include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/line/memory.h"
 #include "core/plan/views_database.h"
 #include "runtime/beams/scan_locator.h"
+#include "runtime/belief/plan_tracker.h"
 #include "stages/decompose_views/decompose_views.h"
 
 namespace {
 
 using namespace cairn;
-using Vec2 = Eigen::Vector2d;
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-// One wall of the map: points of all segments that lie on it, as a line with an extent.
-struct MapWall {
-  Vec2 centre, along;
-  double low, high, weight;
-  int num_scans;
-};
-
-// Joins a segment to the wall that it continues or repeats, walls seen from one side only being one-sided.
-void AddSegment(const Vec2& start, const Vec2& end, std::vector<MapWall>* walls) {
-  const Vec2 along = (end - start).normalized(), middle = 0.5 * (start + end);
-  const double length = (end - start).norm();
-  for (MapWall& wall : *walls) {
-    if (wall.along.dot(along) < std::cos(6 * kDegree)) continue;
-    const Vec2 normal(-wall.along.y(), wall.along.x());
-    const double a = wall.along.dot(start - wall.centre), b = wall.along.dot(end - wall.centre);
-    if (std::max(std::abs(normal.dot(start - wall.centre)), std::abs(normal.dot(end - wall.centre))) > 0.12)
-      continue;
-    if (b < wall.low - 0.3 || a > wall.high + 0.3) continue;
-    const double weight = wall.weight + length;
-    const double share = length / weight;
-    // The line moves towards the segment, by its share.
-    const Vec2 low = wall.centre + wall.low * wall.along, high = wall.centre + wall.high * wall.along;
-    wall.centre += share * normal.dot(middle - wall.centre) * normal;
-    wall.along = (wall.along + share * (along - wall.along)).normalized();
-    wall.low = std::min(wall.along.dot(low - wall.centre), wall.along.dot(start - wall.centre));
-    wall.high = std::max(wall.along.dot(high - wall.centre), wall.along.dot(end - wall.centre));
-    wall.weight = weight;
-    ++wall.num_scans;
-    return;
-  }
-  walls->push_back({middle, along, -0.5 * length, 0.5 * length, length, 1});
-}
-
 // What became of one scan.
 struct Outcome {
   bool first = false, any = false, none = true, single = false;
@@ -89,6 +55,71 @@ Outcome LocateOne(const ScanLocator& locator, const RangeScan& scan, const ScanS
     outcome.nees = error.dot(found.covariance.inverse() * error);
   }
   return outcome;
+}
+
+// A robot that wakes up at a scan and drives on for 10 m.
+struct Drive {
+  bool right = false, sure = false;  // in the end
+  bool first_sure_right = false, ever_sure_wrong = false;
+  double sure_after_m = -1;  // -1: never
+  double seconds = 0;
+  int num_scans = 0;
+};
+constexpr double kDriveM = 10, kSure = 0.99;
+
+Drive DriveFrom(size_t start, const std::vector<RangeScan>& scans, const std::vector<ScanView>& views,
+                PlanTracker tracker) {
+  Drive drive;
+  double way = 0;
+  const double begin = Seconds();
+  // The scans between are the map's.
+  for (size_t i = start; i < scans.size() && way < kDriveM; i += 2) {
+    if (i > start) {
+      const PlanarPose &before = *views[i - 2].odometry, &now = *views[i].odometry;
+      (void)tracker.Move(
+          {before.RobotFromFloor(now.position), WrapAngle(now.heading_rad - before.heading_rad)});
+      way += (scans[i].pose.position - scans[i - 2].pose.position).norm();
+    }
+    (void)tracker.SeeScan(views[i]);
+    ++drive.num_scans;
+    const std::vector<PossiblePlace>& places = tracker.belief().places();
+    if (places.empty()) continue;
+    drive.right = IsRight(places[0].pose, scans[i].pose);
+    drive.sure = places[0].probability >= kSure && IsDetermined(places[0].covariance);
+    drive.ever_sure_wrong = drive.ever_sure_wrong || (drive.sure && !drive.right);
+    if (!drive.sure || drive.sure_after_m >= 0) continue;
+    drive.sure_after_m = way;
+    drive.first_sure_right = drive.right;
+  }
+  drive.seconds = Seconds() - begin;
+  return drive;
+}
+
+std::string Figures(const std::vector<Drive>& drives) {
+  int right = 0, sure = 0, sure_wrong = 0, first_right = 0, ever = 0, any = 0, num_scans = 0;
+  double seconds = 0;
+  std::vector<double> after;
+  for (const Drive& drive : drives) {
+    right += drive.right;
+    sure += drive.sure;
+    sure_wrong += drive.sure && !drive.right;
+    any += drive.sure_after_m >= 0;
+    first_right += drive.first_sure_right;
+    ever += drive.ever_sure_wrong;
+    num_scans += drive.num_scans;
+    seconds += drive.seconds;
+    after.push_back(drive.sure_after_m >= 0 ? drive.sure_after_m : 2 * kDriveM);
+  }
+  std::sort(after.begin(), after.end());
+  const auto num = static_cast<double>(drives.size());
+  return fmt::format(
+      "{:g} m by odometry from {} starts: {} right in the end ({:.2f} %), sure of one place {}, wrongly {}; "
+      "sure within them {}, the first time rightly {} ({:.2f} %), wrongly at any scan {} (starts); sure "
+      "after "
+      "{:.1f} m (median), {:.1f} (90 %), {:.1f} (99 %); {:.1f} ms a scan\n",
+      kDriveM, drives.size(), right, 100 * right / num, sure, sure_wrong, any, first_right,
+      100 * first_right / num, ever, after[after.size() / 2], after[after.size() * 9 / 10],
+      after[after.size() * 99 / 100], 1e3 * seconds / num_scans);
 }
 
 std::string Row(const std::string& search, const std::vector<Outcome>& outcomes) {
@@ -152,18 +183,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   const ScanSegmentsOptions segment_options;
-  std::vector<MapWall> walls;
-  for (size_t i = 0; i < scans->size(); i += 2) {
-    for (const ScanSegment& segment : FindScanSegments((*scans)[i], segment_options))
-      AddSegment((*scans)[i].pose.FloorFromRobot(segment.start), (*scans)[i].pose.FloorFromRobot(segment.end),
-                 &walls);
-  }
-  decompose_views::InputPlan input;
-  for (const MapWall& wall : walls) {
-    if (wall.num_scans < 3 || wall.high - wall.low < 0.4) continue;
-    input.segments.push_back({wall.centre + wall.low * wall.along, wall.centre + wall.high * wall.along,
-                              static_cast<int>(input.segments.size()) + 1});
-  }
+  const decompose_views::InputPlan input = MapOfEverySecond(*scans, segment_options);
   decompose_views::DecomposeViewsOptions options;
   options.clean.snap_m = 0.05;
   options.clean.simplify_m = 0.03;
@@ -202,5 +222,17 @@ int main(int argc, char** argv) {
     more += Figures(search, outcomes);
   }
   std::fputs(more.c_str(), stdout);
+  if (!(*scans)[0].odometry) return 0;
+  const auto tracker = PlanTracker::Make(result->views);
+  if (!tracker.ok()) {
+    std::fprintf(stderr, "%s\n", tracker.error().message.c_str());
+    return 1;
+  }
+  std::vector<ScanView> views;
+  for (const RangeScan& scan : *scans) views.push_back(ViewOf(scan, segment_options));
+  std::vector<Drive> drives(queries.size());
+  ParallelFor(static_cast<int64_t>(queries.size()), 0,
+              [&](int64_t i) { drives[i] = DriveFrom(queries[i], *scans, views, *tracker); });
+  std::fputs(Figures(drives).c_str(), stdout);
   return 0;
 }

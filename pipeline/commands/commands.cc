@@ -38,9 +38,9 @@ Command StageFamily() {
 }
 
 Command PlanFamily() {
-  return Family(
-      "plan", "Floor plans and laser scans: where a scan was taken, paths, look-alike places",
-      {decompose_views::DecomposeViewsCommand(), LocateScanCommand(), PlanPathCommand(), TellApartCommand()});
+  return Family("plan", "Floor plans and laser scans: where a scan was taken, paths, look-alike places",
+                {decompose_views::DecomposeViewsCommand(), LocateScanCommand(), FollowScansCommand(),
+                 PlanPathCommand(), TellApartCommand()});
 }
 
 Command UpdateFamily() {

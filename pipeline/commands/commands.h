@@ -45,6 +45,8 @@ Command WhereCommand();
 Command AtlasCommand();
 // cairn plan locate VIEWS SCAN [--scan N] [--svg FILE]
 Command LocateScanCommand();
+// cairn plan follow VIEWS LOG [--start N] [--images LIST] [--svg FILE]
+Command FollowScansCommand();
 // cairn plan path VIEWS --from X,Y [--to X,Y] [--kind short|min-link|search] [--svg FILE]
 Command PlanPathCommand();
 // cairn plan tell-apart VIEWS --a X,Y,DEG --b X,Y,DEG [--svg FILE]

@@ -143,8 +143,8 @@ Eigen::Matrix3d BeamModel::Covariance(const std::vector<Beam>& beams, double sig
   std::stable_sort(matches.begin(), matches.end(),
                    [](const Match& a, const Match& b) { return a.wall < b.wall; });
   const double precision = 1 / (sigma_m * sigma_m);
-  // Known to some hundred metres, whatever the beams say.
-  const Eigen::Matrix3d prior = Eigen::Vector3d(1e-4, 1e-4, 0.1).asDiagonal();
+  // Known to some ten metres, whatever the beams say: more would cost the other directions their digits.
+  const Eigen::Matrix3d prior = Eigen::Vector3d(1e-2, 1e-2, 0.1).asDiagonal();
   Eigen::Matrix3d information = prior, scatter = prior;  // of the gradient that Refine brings to zero
   const Eigen::Matrix2d of_wall =
       Eigen::Vector2d(std::pow(options_.sigma_wall_m, 2), std::pow(RadFromDeg(options_.sigma_wall_deg), 2))
@@ -170,7 +170,8 @@ Eigen::Matrix3d BeamModel::Covariance(const std::vector<Beam>& beams, double sig
     begin = end;
   }
   const Eigen::Matrix3d inverse = information.inverse();
-  return inverse * scatter * inverse;
+  const Eigen::Matrix3d covariance = inverse * scatter * inverse;
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 }  // namespace cairn

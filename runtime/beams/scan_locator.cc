@@ -70,6 +70,15 @@ double WeightOfABeam(const std::vector<Beam>& beams) {
   return std::min(1.0, static_cast<double>(sectors.size()) / static_cast<double>(beams.size()));
 }
 
+// Where the beams ended that are searched with.
+std::vector<BeamEnd> SearchedEnds(const std::vector<Beam>& beams) {
+  std::vector<BeamEnd> ends = EndsApart(SomeOf(beams, kMaxNumBeamsSearched), kThinM);
+  if (ends.size() <= kMaxNumEnds) return ends;
+  std::vector<BeamEnd> some;
+  for (size_t i = 0; i < kMaxNumEnds; ++i) some.push_back(ends[i * ends.size() / kMaxNumEnds]);
+  return some;
+}
+
 bool AreTheSame(const PlanarPose& a, const PlanarPose& b) {
   return (a.position - b.position).norm() < kSameM &&
          std::abs(WrapAngle(a.heading_rad - b.heading_rad)) < kSameRad;
@@ -148,7 +157,7 @@ std::vector<PoseGroup> GroupPoses(const std::vector<WeighedPose>& poses, double 
 void SpreadAlong(const PoseGroup& group, ScanHypothesis* found) {
   const auto [along, sigma] = LeastKnown(found->covariance);
   const double length = group.high_m - group.low_m;
-  found->determined = sigma <= kKnownM && std::sqrt(found->covariance(2, 2)) <= kKnownRad;
+  found->determined = IsDetermined(found->covariance);
   if (group.along == Vec2::Zero() || sigma <= kKnownM) return;
   found->pose.position += 0.5 * (group.low_m + group.high_m) * group.along;
   const double variance = length * length / 12 + kSameM * kSameM;  // of a uniform distribution
@@ -157,6 +166,10 @@ void SpreadAlong(const PoseGroup& group, ScanHypothesis* found) {
 }
 
 }  // namespace
+
+bool IsDetermined(const Eigen::Matrix3d& covariance) {
+  return LeastKnown(covariance).second <= kKnownM && std::sqrt(covariance(2, 2)) <= kKnownRad;
+}
 
 OptionTable DescribeOptions(ScanLocatorOptions* o) {
   OptionTable table = {
@@ -210,27 +223,23 @@ Result<ScanLocator> ScanLocator::Make(const Views& views, const ScanLocatorOptio
   return ScanLocator(views, options);
 }
 
-std::vector<WeighedPose> ScanLocator::PosesByBeams(const std::vector<Beam>& beams,
+std::vector<WeighedPose> ScanLocator::PosesByBeams(const std::vector<BeamEnd>& ends,
                                                    const std::vector<Beam>& few, LocatedScan* located) const {
-  std::vector<BeamEnd> ends = EndsApart(SomeOf(beams, kMaxNumBeamsSearched), kThinM);
-  if (ends.size() > kMaxNumEnds) {
-    std::vector<BeamEnd> some;
-    for (size_t i = 0; i < kMaxNumEnds; ++i) some.push_back(ends[i * ends.size() / kMaxNumEnds]);
-    ends = std::move(some);
-  }
   const PoseSearchResult found = SearchPoses(*field_, ends, {});
   located->num_tried = found.num_windows;
   located->complete = found.complete;
   std::vector<WeighedPose> poses;
-  for (const FieldPose& pose : found.poses) {
-    // By the walls nearest to ends, or by those that beams meet first: the better, where walls are dense the
-    // second, where the pose is far off the first.
-    const WeighedPose by_ends = Weighed(few, RefineByEnds(*field_, plan_->walls, ends, pose.pose)),
-                      by_beams = Weighed(few, model_.Refine(few, kRefineSigmas[0], pose.pose));
-    const bool ends_fit = by_ends.evidence.log_likelihood >= by_beams.evidence.log_likelihood;
-    poses.push_back(ends_fit ? by_ends : by_beams);
-  }
+  for (const FieldPose& pose : found.poses) poses.push_back(BestNear(pose.pose, ends, few));
   return poses;
+}
+
+WeighedPose ScanLocator::BestNear(const PlanarPose& pose, const std::vector<BeamEnd>& ends,
+                                  const std::vector<Beam>& few) const {
+  // By the walls nearest to ends, or by those that beams meet first: the better, where walls are dense the
+  // second, where the pose is far off the first.
+  const WeighedPose by_ends = Weighed(few, RefineByEnds(*field_, plan_->walls, ends, pose)),
+                    by_beams = Weighed(few, model_.Refine(few, kRefineSigmas[0], pose));
+  return by_ends.evidence.log_likelihood >= by_beams.evidence.log_likelihood ? by_ends : by_beams;
 }
 
 Result<std::vector<WeighedPose>> ScanLocator::PosesBySegments(const ScanView& scan,
@@ -278,7 +287,17 @@ void ScanLocator::Interpret(const std::vector<ScanSegment>& segments, ScanHypoth
   if (found->num_matched > 0) found->rms_m = std::sqrt(sum / (2 * found->num_matched));
 }
 
-Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
+Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const PlanarPose> expected) const {
+  return Locate(scan, expected, /*searches=*/true);
+}
+
+Result<LocatedScan> ScanLocator::LocateNear(const ScanView& scan,
+                                            std::span<const PlanarPose> expected) const {
+  return Locate(scan, expected, /*searches=*/false);
+}
+
+Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const PlanarPose> expected,
+                                        bool searches) const {
   LocatedScan located;
   const auto num_met =
       std::count_if(scan.beams.begin(), scan.beams.end(), [](const Beam& beam) { return beam.met; });
@@ -288,20 +307,28 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
   }
   // The best by some of the beams, then refined and weighed by all.
   const std::vector<Beam> few = SomeOf(scan.beams, kNumFewBeams);
+  const std::vector<BeamEnd> ends = SearchedEnds(scan.beams);
   std::vector<WeighedPose> weighed;
-  if (options_.search == "beams") {
-    weighed = PosesByBeams(scan.beams, few, &located);
-  } else {
+  if (searches && options_.search == "beams") {
+    weighed = PosesByBeams(ends, few, &located);
+  } else if (searches) {
     CAIRN_ASSIGN_OR_RETURN(weighed, PosesBySegments(scan, few, &located));
   }
   BestFirst(&weighed);
   RemoveTheSame(&weighed);
+  std::vector<WeighedPose> near;
+  for (const PlanarPose& pose : expected) near.push_back(BestNear(pose, ends, few));
+  BestFirst(&near);
+  RemoveTheSame(&near);
   const double weight = WeightOfABeam(scan.beams);
   const auto covariance_of = [&](const WeighedPose& pose) {
     return model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
   };
   const std::vector<Beam> refining = SomeOf(scan.beams, kMaxNumBeamsRefined);
   std::vector<PoseGroup> groups = GroupPoses(weighed, WeightOfABeam(few), kNumRefined, covariance_of);
+  const bool all_refined = groups.size() < kNumRefined;
+  for (const PoseGroup& group : GroupPoses(near, WeightOfABeam(few), near.size(), covariance_of))
+    groups.push_back(group);
   for (PoseGroup& group : groups) {
     PlanarPose refined = group.best.pose;
     for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
@@ -334,10 +361,13 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan) const {
   for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;
   const double least = options_.least_odds * located.hypotheses.front().probability;
   // Where not all were refined, the others are no less likely than the last.
-  if (groups.size() == kNumRefined && located.hypotheses.back().probability >= least)
-    located.complete = false;
-  std::erase_if(located.hypotheses, [&](const ScanHypothesis& found) { return found.probability < least; });
-  if (located.hypotheses.size() > kMaxNumHypotheses) located.hypotheses.resize(kMaxNumHypotheses);
+  if (!all_refined && located.hypotheses.back().probability >= least) located.complete = false;
+  int num_kept = 0;
+  std::erase_if(located.hypotheses, [&](const ScanHypothesis& found) {
+    const bool is_expected = std::any_of(
+        near.begin(), near.end(), [&](const WeighedPose& pose) { return AreTheSame(pose.pose, found.pose); });
+    return !is_expected && (found.probability < least || ++num_kept > kMaxNumHypotheses);
+  });
   for (ScanHypothesis& found : located.hypotheses) {
     found.probability /= sum;
     Interpret(scan.segments, &found);

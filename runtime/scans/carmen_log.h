@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,12 +18,19 @@ struct RangeScan {
   double max_range_m = std::numeric_limits<double>::infinity();  // beams of this range met nothing
   PlanarPose pose;                                               // of the laser, from the log
   double time_s = 0;                                             // of the log
+  // Of the laser by the robot's wheels alone, in a frame of theirs that drifts.
+  std::optional<PlanarPose> odometry;
 };
 
 // Reads the FLASER lines of a Carmen log:
 //   FLASER n r_1 ... r_n x y theta odom_x odom_y odom_theta ipc_timestamp host logger_timestamp
-// n beams over 180 degrees, the first at -90 (n even: steps of 180 / n; odd: of 180 / (n - 1)).  Other
-// messages are left out.  The largest range of a log is the laser's own where it occurs often.  Errors:
+// n beams over 180 degrees, the first at -90 (n even: steps of 180 / n; odd: of 180 / (n - 1)).  The largest
+// range of a log is the laser's own where it occurs often.  Odometry is that of FLASER lines where in some of
+// them it differs from the pose; else, as where poses were corrected later, what the ODOM lines around a scan
+// say at its time:
+//   ODOM x y theta tv rv accel ipc_timestamp host logger_timestamp
+// (without a time it is a corrected pose, from which the next lines go on.)  Wheels move a laser that stands
+// `PARAM robot_frontlaser_offset` metres ahead of their axle.  Other messages are left out.  Errors:
 // NotFound, Corrupt (a line that is cut short or has an invalid number; gzip), NoData (no FLASER).
 Result<std::vector<RangeScan>> ReadCarmenLog(const std::string& path);
 Result<std::vector<RangeScan>> ParseCarmenLog(const std::string& text, const std::string& what);

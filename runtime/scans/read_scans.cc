@@ -53,7 +53,7 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
 }  // namespace
 
 ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options) {
-  return {FindScanSegments(scan, options), BeamsOf(scan, options.max_range_m), scan.pose};
+  return {FindScanSegments(scan, options), BeamsOf(scan, options.max_range_m), scan.pose, scan.odometry};
 }
 
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,

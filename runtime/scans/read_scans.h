@@ -15,6 +15,7 @@ struct ScanView {
   std::vector<ScanSegment> segments;
   std::vector<Beam> beams;                // of a scan that is given by its segments: beams to these
   std::optional<PlanarPose> logged_pose;  // of a log's corrected poses
+  std::optional<PlanarPose> odometry;     // RangeScan::odometry
 };
 
 // What a scan of a log shows.

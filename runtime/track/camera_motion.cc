@@ -26,6 +26,8 @@ OptionTable DescribeOptions(WheelErrorOptions* o) {
        "standard deviation of each half metre that odometry states, as part of it", 0, 10},
       {"wheel_way_sigma_m", &o->wheel_way_sigma_m, "and in any case, since the last fix, m", 1e-6},
       {"wheel_turn_ratio", &o->wheel_turn_ratio, "the same of each 20 degrees of its turns", 0, 10},
+      {"wheel_drift_deg", &o->wheel_drift_deg, "of the heading in each half metre of the way, degrees", 0,
+       90},
       {"wheel_turn_sigma_deg", &o->wheel_turn_sigma_deg, "and in any case, since the last fix, degrees",
        1e-6},
   };
@@ -95,7 +97,8 @@ void MotionSinceFix::Add(const FloorMotion& motion, const Pose& floor_from_world
   const Eigen::Vector3d up = cam_from_floor.col(2);
   told_.topLeftCorner<3, 3>() += errors.wheel_turn_ratio * errors.wheel_turn_ratio * kTurnRad *
                                  std::abs(motion.turn_left_rad) * up * up.transpose();
-  const double way_m = way.norm();
+  const double way_m = way.norm(), drift_rad = RadFromDeg(errors.wheel_drift_deg);
+  told_.topLeftCorner<3, 3>() += drift_rad * drift_rad / kWayM * way_m * up * up.transpose();
   if (way_m > 0) {
     const Eigen::Vector3d along = cam_from_floor * Eigen::Vector3d(way.x(), way.y(), 0) / way_m;
     const Eigen::Vector3d beside = up.cross(along);

@@ -49,6 +49,8 @@ struct WheelErrorOptions {
   // > 0
   double wheel_turn_ratio = 0.05;
   double wheel_turn_sigma_deg = 0.05;
+  // Of its heading, in each half metre of the way, however straight, degrees.  REQUIRES: >= 0
+  double wheel_drift_deg = 0;
 };
 OptionTable DescribeOptions(WheelErrorOptions* options);
 

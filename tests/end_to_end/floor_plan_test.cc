@@ -1,5 +1,9 @@
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
+#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,6 +11,7 @@
 
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
+#include "tests/runtime/beams/laser_fixture.h"
 
 namespace cairn {
 namespace {
@@ -76,6 +81,54 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   EXPECT_EQ(json::parse(apart.out)["outcome"], "found");
 }
 
+// A line of a log: a scan in a plan, with noiseless wheels that began elsewhere.
+std::string LoggedScan(const std::vector<PlanWall>& walls, const PlanarPose& pose) {
+  Random random(1);
+  std::string line = "FLASER 180";
+  for (const Beam& beam : BeamsAt(walls, pose, 0, &random)) line += fmt::format(" {:.4f}", beam.range_m);
+  const PlanarPose wheels{{7 - pose.position.x(), 3 - pose.position.y()},
+                          WrapAngle(pose.heading_rad + std::numbers::pi)};
+  return line + fmt::format(" {} {} {} {} {} {} 1 host 1\n", pose.position.x(), pose.position.y(),
+                            pose.heading_rad, wheels.position.x(), wheels.position.y(), wheels.heading_rad);
+}
+
+TEST_F(FloorPlan, ARobotIsFollowedFromAnywhere) {
+  ASSERT_EQ(Run("plan decompose plan.txt -o views.db").exit_code, 0);
+  const std::vector<PlanWall> walls = {{{0, 0}, {6, 0}}, {{6, 0}, {6, 4}},       {{6, 4}, {0, 4}},
+                                       {{0, 4}, {0, 0}}, {{3.5, 0}, {3.5, 1.5}}, {{3.5, 2.5}, {3.5, 4}}};
+  std::vector<PlanarPose> way;
+  for (const double x : {1.0, 1.6, 2.2, 2.8, 3.4, 4.0}) way.push_back({{x, 2.1}, 0.1});
+  std::string log;
+  for (const PlanarPose& pose : way) log += LoggedScan(walls, pose);
+  ASSERT_TRUE(WriteFileAtomically(Path("way.log"), log).ok());
+  const ProgramRun run = Run("plan follow views.db way.log --svg way.svg");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::istringstream lines(run.out);
+  std::string line;
+  for (size_t i = 0; i < way.size(); ++i) {
+    ASSERT_TRUE(std::getline(lines, line));
+    const json found = json::parse(line);
+    EXPECT_EQ(found["scan"], i);
+    EXPECT_EQ(found["beams"], 180);
+    double sum = found["elsewhere"].get<double>();
+    for (const json& place : found["places"]) sum += place["probability"].get<double>();
+    EXPECT_NEAR(sum, 1, 0.01);
+    if (i < 2) continue;
+    const json& first = found["places"][0];
+    EXPECT_NEAR(first["x"].get<double>(), way[i].position.x(), 0.05);
+    EXPECT_NEAR(first["y"].get<double>(), way[i].position.y(), 0.05);
+    EXPECT_NEAR(first["heading_deg"].get<double>(), DegFromRad(0.1), 1);
+    EXPECT_GT(first["probability"].get<double>(), 0.99);
+    EXPECT_TRUE(first["determined"].get<bool>());
+    EXPECT_EQ(first["covariance"].size(), 9u);
+  }
+  EXPECT_FALSE(std::getline(lines, line));
+  EXPECT_EQ(run.out, Run("plan follow views.db way.log --threads 1").out);
+  EXPECT_THAT(*ReadFile(Path("way.svg")), HasSubstr("6 scans"));
+  const ProgramRun later = Run("plan follow views.db way.log --start 4");
+  EXPECT_EQ(json::parse(later.out.substr(0, later.out.find('\n')))["scan"], 4);
+}
+
 TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
   ASSERT_TRUE(WriteFileAtomically(Path("twins.txt"),
                                   "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n"
@@ -103,6 +156,9 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   write("open.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}");
   write("crossing.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[2,2],[2,0],[0,2],[0,0]]]}");
   write("one.txt", "1,-1,1,1\n");
+  write("two.txt", "a.png\n\n");
+  write("still.log", "FLASER 4 1 1 1 1 1 1 0 1 1 0 1 h 1\nFLASER 4 1 1 1 1 1 1 0 1 1 0 2 h 2\n");
+  write("cut.log", "ODOM 1\nFLASER 4 1 1 1 1 1 1 0 1 1 0 1 h 1\n");
   write("scan.txt", "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n");
   write(
       "twins.txt",
@@ -131,6 +187,16 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan locate views.db scan.txt --split-m inf", 2, "split_m"},
            Case{"plan locate views.db scan.txt --search vir --max-null-ratio nan", 2, "max_null_ratio"},
            Case{"plan locate views.db scan.txt --max-null-ratio 0.3", 2, "search"},
+           Case{"plan follow views.db still.log", 2, "still.log has no odometry"},
+           Case{"plan follow views.db still.log --start 2", 2,
+                "--start 2: it has 2 scan(s), numbered 0 to 1"},
+           Case{"plan follow views.db still.log --start -1", 2, "--start -1"},
+           Case{"plan follow views.db still.log --laser-in-camera 1,0,0", 2, "name these with --images"},
+           Case{"plan follow views.db still.log --images one.txt", 2, "one.txt: 1 lines for 2 scans"},
+           Case{"plan follow views.db still.log --images two.txt", 14, "--images needs a map"},
+           Case{"plan follow views.db still.log --images none.txt", 3, "none.txt"},
+           Case{"plan follow views.db still.log --lost-ratio 0", 2, "lost_ratio"},
+           Case{"plan follow views.db cut.log", 4, "cut.log: line 1: ODOM with 2 words"},
            Case{"plan path views.db --from 1,1", 2, "--to"},
            Case{"plan path views.db --from 1,1 --to 3.5,1", 6, "does not fit at (3.5, 1): a wall is 0.000 m"},
            Case{"plan path views.db --from 1,1 --to 3.5,1 --radius-m 0", 6, "lies on a wall"},
@@ -192,6 +258,30 @@ TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
   ASSERT_EQ(in_map.exit_code, 0) << in_map.err;
   EXPECT_FALSE(json::parse(in_map.out)["solutions"].empty());
   EXPECT_EQ(in_map.out, Run("plan locate tiny.build/views.db scan.txt").out);
+
+  // What a robot's camera sees counts as its scans do: here these say nothing.
+  std::vector<std::string> names;
+  for (const auto& image : fs::directory_iterator(Path("tiny.build/capture/images")))
+    names.push_back(image.path().filename());
+  ASSERT_FALSE(names.empty());
+  const std::string name = *std::min_element(names.begin(), names.end());
+  ASSERT_TRUE(WriteFileAtomically(Path("images.txt"), "tiny.build/capture/images/" + name + "\n\n").ok());
+  ASSERT_TRUE(WriteFileAtomically(Path("blind.log"),
+                                  "FLASER 2 0 0 1 1 0 2 1 0 1 h 1\n"
+                                  "FLASER 2 0 0 2 1 0 2.5 1 0 2 h 2\n")
+                  .ok());
+  const ProgramRun followed =
+      Run("plan follow tiny.cairn blind.log --images images.txt --laser-in-camera 0.2,0,90");
+  ASSERT_EQ(followed.exit_code, 0) << followed.err;
+  const size_t end = followed.out.find('\n');
+  const json first = json::parse(followed.out.substr(0, end)),
+             second = json::parse(followed.out.substr(end + 1));
+  EXPECT_EQ(first["image"], "fix");
+  EXPECT_THAT(first["reason"].get<std::string>(), HasSubstr("at least three"));
+  EXPECT_GT(first["places"][0]["probability"].get<double>(), 0.9);
+  EXPECT_FALSE(second.contains("image"));
+  const auto at = [](const json& line, const char* axis) { return line["places"][0][axis].get<double>(); };
+  EXPECT_NEAR(std::hypot(at(second, "x") - at(first, "x"), at(second, "y") - at(first, "y")), 0.5, 1e-6);
 
   // A plan that is off is noticed, and only what depends on it is done again.
   const std::string plan = *ReadFile(Path("tiny.build/capture/floor_plan.geojson"));

@@ -89,11 +89,70 @@ TEST(CarmenLog, ReadsBeamsPoseAndTime) {
   EXPECT_EQ((*scans)[0].time_s, 7.25);
 }
 
+std::vector<RangeScan> Scans(const std::string& log) {
+  auto scans = ParseCarmenLog(log, "log");
+  EXPECT_TRUE(scans.ok());
+  return scans.ok() ? std::move(*scans) : std::vector<RangeScan>();
+}
+
+void ExpectOdometry(const RangeScan& scan, double x, double y, double heading_rad) {
+  ASSERT_TRUE(scan.odometry);
+  EXPECT_NEAR(scan.odometry->position.x(), x, 1e-12);
+  EXPECT_NEAR(scan.odometry->position.y(), y, 1e-12);
+  EXPECT_NEAR(scan.odometry->heading_rad, heading_rad, 1e-12);
+}
+
+TEST(CarmenLog, ScansThatSayWhatTheWheelsSayHaveTheirOdometry) {
+  const auto scans =
+      Scans("ODOM 5 5 0 0 0 0 1 h 1\nFLASER 1 2 10 20 0.5 9 19 0.4 1 h 1\nFLASER 1 2 1 2 3 1 2 3 2 h 2\n");
+  ASSERT_EQ(scans.size(), 2u);
+  ExpectOdometry(scans[0], 9, 19, 0.4);
+  ExpectOdometry(scans[1], 1, 2, 3);
+}
+
+TEST(CarmenLog, OdometryAtAScansTimeIsBetweenTheMessagesAroundIt) {
+  const std::string scan = "FLASER 1 2 7 8 0.5 7 8 0.5 ";
+  const auto scans = Scans(scan + "0.5 h 1\nODOM 1 2 3.1 0 0 0 1 h 1\n" + scan + "2 h 2\n" + scan +
+                           "9 h 2\nODOM 5 10 -3.1 0 0 0 5 h 5\n" + scan + "6 h 6\n");
+  ASSERT_EQ(scans.size(), 4u);
+  ExpectOdometry(scans[0], 1, 2, 3.1);  // before the first: as there
+  ExpectOdometry(scans[1], 2, 4, WrapAngle(3.1 + 0.25 * (2 * std::numbers::pi - 6.2)));
+  ExpectOdometry(scans[2], 5, 10, -3.1);  // a clock that is ahead
+  ExpectOdometry(scans[3], 5, 10, -3.1);
+  EXPECT_FALSE(Scans(scan + "1 h 1\n")[0].odometry);
+}
+
+// As the logs of gridded SLAM are written: ODOM without a time states the corrected pose of the scan before.
+TEST(CarmenLog, CorrectionsOfPosesMoveNothing) {
+  const std::string scan = "FLASER 1 2 7 8 0 7 8 0 ";
+  const auto scans =
+      Scans("ODOM 0 0 0 0 0 0 1 h 1\nODOM 1 0 0 0 0 0 2 h 2\n" + scan +
+            "2 h 2\nODOM 7 8 1.5707963267948966 0 0 0 0 h 0\nODOM 7 10 1.5707963267948966 0 0 0 3 h 3\n" +
+            scan + "3 h 3\n");
+  ASSERT_EQ(scans.size(), 2u);
+  ExpectOdometry(scans[0], 1, 0, 0);
+  ExpectOdometry(scans[1], 3, 0, 0);  // two metres ahead
+}
+
+TEST(CarmenLog, WheelsMoveTheLaserThatStandsAheadOfThem) {
+  const std::string log = "ODOM 1 2 1.5707963267948966 0 0 0 1 h 1\nFLASER 1 2 7 8 0 7 8 0 1 h 1\n";
+  ExpectOdometry(Scans("PARAM robot_frontlaser_offset 0.5 h 0\n" + log)[0], 1, 2.5, std::numbers::pi / 2);
+  ExpectOdometry(Scans(log)[0], 1, 2, std::numbers::pi / 2);
+  // Without times, or an acceleration.
+  ExpectOdometry(Scans("ODOM 1 2 3\nFLASER 1 2 7 8 0 7 8 0 1 h 1\n")[0], 1, 2, 3);
+  ExpectOdometry(Scans("ODOM 1 2 3 0 0 4 h 4\nFLASER 1 2 7 8 0 7 8 0 5 h 5\nODOM 2 2 3 0 0 6 h 6\n")[0], 1.5,
+                 2, 3);
+}
+
 TEST(CarmenLog, RefusesLinesThatAreCutShort) {
   EXPECT_EQ(ParseCarmenLog("FLASER 4 1 2 3\n", "log").error().code, ErrorCode::kCorrupt);
   EXPECT_EQ(ParseCarmenLog("FLASER 1 x 0 0 0 0 0 0 1 h 1\n", "log").error().code, ErrorCode::kCorrupt);
   EXPECT_EQ(ParseCarmenLog("FLASER 999999999 1\n", "log").error().code, ErrorCode::kCorrupt);
-  EXPECT_EQ(ParseCarmenLog("ODOM 1\n", "log").error().code, ErrorCode::kNoData);
+  EXPECT_EQ(ParseCarmenLog("PARAM a b\n", "log").error().code, ErrorCode::kNoData);
+  EXPECT_EQ(ParseCarmenLog("ODOM 1\n", "log").error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(ParseCarmenLog("\nODOM 1 2 x 0 0 0 1 h 1\n", "log").error().message,
+              HasSubstr("log: line 2: \"x\""));
+  EXPECT_EQ(ParseCarmenLog("PARAM robot_frontlaser_offset \n", "log").error().code, ErrorCode::kCorrupt);
   EXPECT_THAT(ParseCarmenLog("\x1f\x8b\x08", "log").error().message, HasSubstr("gunzip"));
 }
 

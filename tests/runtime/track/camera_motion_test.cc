@@ -114,8 +114,8 @@ TEST(MotionSinceFix, ErrorsOfTheFixAndOfMotionsInSpaceAreInTheCovariance) {
 
 // Wheels that err by a twentieth of each half metre and of each 20 degrees.
 TEST(MotionSinceFix, ErrorsOfWheelsAreInTheCovarianceHoweverOftenTheyAreRead) {
-  const WheelErrorOptions errors;
-  for (const int num_readings : {1, 4}) {
+  for (const auto& [num_readings, drift_deg] : {std::pair(1, 0.0), std::pair(4, 0.0), std::pair(4, 3.0)}) {
+    const WheelErrorOptions errors{.wheel_drift_deg = drift_deg};
     const double share = 1.0 / num_readings;
     const double mean = MeanSquare([&](Random& random) {
       const Pose start = PoseAt({1, 2, 1}, 40);
@@ -125,7 +125,9 @@ TEST(MotionSinceFix, ErrorsOfWheelsAreInTheCovarianceHoweverOftenTheyAreRead) {
         for (int k = 0; k < num_readings; ++k) {
           motion.Add(reading, Pose(), errors);
           const double way_sigma_m = errors.wheel_way_ratio * 0.5 * std::sqrt(share);
-          const double turn_sigma_rad = errors.wheel_turn_ratio * RadFromDeg(20) * std::sqrt(share);
+          const double turn_sigma_rad =
+              std::hypot(errors.wheel_turn_ratio * RadFromDeg(20), RadFromDeg(errors.wheel_drift_deg)) *
+              std::sqrt(share);
           const FloorMotion driven{
               {random.Normal(reading.way_m.x(), way_sigma_m), random.Normal(0, way_sigma_m / 3)},
               random.Normal(reading.turn_left_rad, turn_sigma_rad)};
@@ -139,7 +141,7 @@ TEST(MotionSinceFix, ErrorsOfWheelsAreInTheCovarianceHoweverOftenTheyAreRead) {
       const Matrix6d covariance = once.cwiseAbs2().asDiagonal();
       return std::pair(Perturb(truth.cam_from_world(), Drawn(covariance, random)), motion.Predict(errors));
     });
-    EXPECT_NEAR(mean, 6, 0.4) << num_readings;
+    EXPECT_NEAR(mean, 6, 0.4) << num_readings << ", " << drift_deg;
   }
 }
 

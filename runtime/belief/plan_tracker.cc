@@ -1,0 +1,118 @@
+#include "runtime/belief/plan_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <utility>
+
+#include "core/geometry/pose.h"
+
+namespace cairn {
+namespace {
+
+// Ways and turns whose errors are independent of those before (WheelErrorOptions).
+constexpr double kWayM = 0.5, kBeside = 1.0 / 3;
+constexpr double kTurnRad = 20 * std::numbers::pi / 180;
+// Places of a belief from which the laser is looked for.
+constexpr int kMaxNumExpected = 60;
+
+UncertainPlanarPose StepOf(const FloorMotion& motion, const WheelErrorOptions& errors) {
+  UncertainPlanarPose step;
+  step.pose = {motion.way_m, motion.turn_left_rad};
+  const double way_m = motion.way_m.norm();
+  if (way_m > 0) {
+    const Eigen::Vector2d along = motion.way_m / way_m, beside(-along.y(), along.x());
+    step.covariance.topLeftCorner<2, 2>() =
+        errors.wheel_way_ratio * errors.wheel_way_ratio * kWayM * way_m *
+        (along * along.transpose() + kBeside * kBeside * beside * beside.transpose());
+  }
+  const double drift_rad = RadFromDeg(errors.wheel_drift_deg);
+  step.covariance(2, 2) =
+      errors.wheel_turn_ratio * errors.wheel_turn_ratio * kTurnRad * std::abs(motion.turn_left_rad) +
+      drift_rad * drift_rad / kWayM * way_m;
+  return step;
+}
+
+// What wheels err by in any case.
+UncertainPlanarPose StandingStill(const WheelErrorOptions& errors) {
+  UncertainPlanarPose step;
+  const double sigma_rad = RadFromDeg(errors.wheel_turn_sigma_deg);
+  step.covariance.diagonal() << Eigen::Vector2d::Constant(errors.wheel_way_sigma_m *
+                                                          errors.wheel_way_sigma_m),
+      sigma_rad * sigma_rad;
+  return step;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(PlanTrackerOptions* o) {
+  OptionTable table = {
+      {.name = "min_way_m",
+       .value = &o->min_way_m,
+       .help = "a scan or an image counts after so much way since the last one that did, m",
+       .min = 0},
+      {.name = "min_turn_deg",
+       .value = &o->min_turn_deg,
+       .help = "or after so much of a turn, degrees",
+       .min = 0},
+  };
+  for (OptionTable more :
+       {DescribeOptions(&o->belief), DescribeOptions(&o->wheels), DescribeOptions(&o->locator)})
+    std::move(more.begin(), more.end(), std::back_inserter(table));
+  return table;
+}
+
+PlanTracker::PlanTracker(ScanLocator locator, double area_m2, const PlanTrackerOptions& options)
+    : locator_(std::move(locator)), options_(options), belief_(area_m2, options.belief) {}
+
+Result<PlanTracker> PlanTracker::Make(const Views& views, const PlanTrackerOptions& options) {
+  PlanTrackerOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_ASSIGN_OR_RETURN(ScanLocator locator, ScanLocator::Make(views, options.locator));
+  return PlanTracker(std::move(locator), std::max(1.0, ExtentOf(views.plan.walls).prod()), options);
+}
+
+Status PlanTracker::Move(const FloorMotion& motion) {
+  if (!motion.way_m.allFinite() || !std::isfinite(motion.turn_left_rad))
+    return MakeError(ErrorCode::kInvalidArgument, "a motion that is not finite");
+  belief_.Move(StepOf(motion, options_.wheels));
+  for (SinceLook* since : {&since_scan_, &since_image_}) {
+    since->way_m += motion.way_m.norm();
+    since->turn_rad += std::abs(motion.turn_left_rad);
+  }
+  return Ok();
+}
+
+bool PlanTracker::IsNew(const SinceLook& since) const {
+  return !since.any || since.way_m >= options_.min_way_m ||
+         since.turn_rad >= RadFromDeg(options_.min_turn_deg);
+}
+
+Status PlanTracker::SeeScan(const ScanView& scan) {
+  std::vector<PlanarPose> expected;
+  for (const PossiblePlace& place : belief_.places()) {
+    if (std::ssize(expected) == kMaxNumExpected) break;
+    expected.push_back(place.pose);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const LocatedScan located, IsNew(since_scan_) ? locator_.Locate(scan, expected)
+                                                                       : locator_.LocateNear(scan, expected));
+  std::vector<PossiblePlace> places;
+  for (const ScanHypothesis& found : located.hypotheses)
+    places.push_back({{found.pose, found.covariance}, found.probability});
+  See(places, &since_scan_);
+  return Ok();
+}
+
+void PlanTracker::SeeImage(std::span<const PossiblePlace> places) {
+  if (!places.empty()) See(places, &since_image_);
+}
+
+void PlanTracker::See(std::span<const PossiblePlace> places, SinceLook* since) {
+  belief_.Move(StandingStill(options_.wheels));
+  if (!IsNew(*since)) return belief_.Correct(places);
+  belief_.Update(places);
+  *since = {.any = true};
+}
+
+}  // namespace cairn
