@@ -10,7 +10,7 @@
 #include "core/base/random.h"
 #include "core/files/file.h"
 #include "core/line/memory.h"
-#include "stages/decompose_views/arrangement.h"
+#include "core/view_regions/arrangement.h"
 #include "stages/decompose_views/decompose_views.h"
 
 namespace {

@@ -7,8 +7,8 @@
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/line/memory.h"
+#include "core/view_regions/label_faces.h"
 #include "stages/decompose_views/decompose_views.h"
-#include "stages/decompose_views/label_faces.h"
 
 namespace {
 
@@ -21,7 +21,7 @@ struct Tally {
 // Points within the tolerance of a border may see either side of it.
 Tally Compare(const Views& views, int num_points, double tolerance_m) {
   const FloorPlan& plan = views.plan;
-  const decompose_views::WallRays rays(plan);
+  const WallRays rays(plan);
   const FaceLocator locator(views);
   enum Outcome : char { kRight, kNoRegion, kNear, kWrong, kWrongNear };
   std::vector<char> outcomes(num_points);
@@ -38,8 +38,7 @@ Tally Compare(const Views& views, int num_points, double tolerance_m) {
       if (face < 0 && plan.closed) continue;
       if (face < 0) return;
       std::vector<LabelIdx> seen;
-      for (const decompose_views::WindowChange& window : decompose_views::CountWindows(plan, rays, grid))
-        seen.push_back(window.label);
+      for (const WindowChange& window : CountWindows(plan, rays, grid)) seen.push_back(window.label);
       const bool near = locator.BorderDistance(face, place) < tolerance_m;
       const bool right = seen == views.LabelSet(face);
       outcomes[i] = near ? (right ? kNear : kWrongNear) : (right ? kRight : kWrong);

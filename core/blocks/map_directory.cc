@@ -34,11 +34,14 @@ int64_t FewestBytes(BlockKind kind) {
   return 1;
 }
 
-// Kinds of the packed forms of blocks, in files alone.
+// Kinds of the packed forms of blocks, and of a floor plan without regions, in files alone.
 constexpr uint8_t kPackedLandmarks = 13;
 constexpr uint8_t kPackedImages = 14;
+constexpr uint8_t kBarePlan = 15;
 
-uint8_t StoredKind(const BlockEntry& entry) {
+// `has_regions`: of the floor plan.
+uint8_t StoredKind(const BlockEntry& entry, bool has_regions) {
+  if (entry.kind == static_cast<uint8_t>(BlockKind::kFloorPlan)) return has_regions ? entry.kind : kBarePlan;
   if (!entry.is_packed) return entry.kind;
   return entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks) ? kPackedLandmarks : kPackedImages;
 }
@@ -47,6 +50,7 @@ void SetStoredKind(uint8_t stored, BlockEntry* entry) {
   entry->is_packed = stored == kPackedLandmarks || stored == kPackedImages;
   entry->kind = stored == kPackedLandmarks ? static_cast<uint8_t>(BlockKind::kLandmarks)
                 : stored == kPackedImages  ? static_cast<uint8_t>(BlockKind::kImages)
+                : stored == kBarePlan      ? static_cast<uint8_t>(BlockKind::kFloorPlan)
                                            : stored;
 }
 
@@ -114,8 +118,9 @@ int64_t MapDirectory::OrdinalOf(BlockKind kind, int64_t element) const {
 
 std::string MapDirectory::Encode() const {
   BlobWriter writer;
+  const bool has_regions = Count(BlockKind::kViewRegions) > 0;
   for (const BlockEntry& entry : blocks_) {
-    writer.UInt8(StoredKind(entry));
+    writer.UInt8(StoredKind(entry, has_regions));
     writer.UInt32(entry.first);
     writer.UInt32(entry.count);
     writer.UInt32(entry.num_bytes);
@@ -134,9 +139,12 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
   MapDirectory directory;
   directory.blocks_.reserve(bytes.size() / kEntryBytes);
   int64_t num_bytes = 0;
+  bool has_bare_plan = false;
   while (reader.num_left() > 0 && reader.ok()) {
     BlockEntry entry;
-    SetStoredKind(reader.UInt8(), &entry);
+    const uint8_t stored_kind = reader.UInt8();
+    SetStoredKind(stored_kind, &entry);
+    has_bare_plan = has_bare_plan || stored_kind == kBarePlan;
     entry.first = reader.UInt32();
     entry.count = reader.UInt32();
     entry.num_bytes = reader.UInt32();
@@ -184,9 +192,9 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
     return MakeError(ErrorCode::kCorrupt, "directory: {} regions of {} stations",
                      directory.Count(BlockKind::kRegions), directory.Count(BlockKind::kStations));
   }
-  if ((directory.Count(BlockKind::kFloorPlan) > 0) != (directory.Count(BlockKind::kViewRegions) > 0)) {
+  const bool needs_regions = directory.Count(BlockKind::kFloorPlan) > 0 && !has_bare_plan;
+  if (needs_regions != (directory.Count(BlockKind::kViewRegions) > 0))
     return MakeError(ErrorCode::kCorrupt, "directory: a floor plan and its regions belong together");
-  }
   if (directory.Count(BlockKind::kLandmarkModels) > 0 &&
       directory.Count(BlockKind::kLandmarkModels) != directory.Count(BlockKind::kLandmarks)) {
     return MakeError(ErrorCode::kCorrupt, "directory: models of {} landmarks of {}",

@@ -146,8 +146,8 @@ Status CheckAppearance(const MapRows& rows) {
 }
 
 Status CheckPlan(const Views& views) {
-  if (views.plan.walls.empty() != views.parents.empty())
-    return Invalid("{} walls, but {} regions of the floor plan", views.plan.walls.size(), views.num_faces());
+  if (views.plan.walls.empty() && !views.parents.empty())
+    return Invalid("{} regions of a floor plan without walls", views.num_faces());
   if (const Status status = CheckViews(views, "floor plan"); !status.ok())
     return Invalid("{}", status.error().message);
   if (!IsNumberedByUse(views)) return Invalid("floor plan: vertices are not numbered as regions name them");

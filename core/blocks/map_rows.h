@@ -92,7 +92,7 @@ struct MapRows : MapHead {
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 7;
+inline constexpr int kMapVersionMinor = 8;
 // The major version that maps with other descriptors than SIFT's state, so that programs which know those
 // alone refuse them; all else is as in kMapVersionMajor.
 inline constexpr int kMapVersionOfKinds = 3;

@@ -18,7 +18,8 @@ inline constexpr std::array kMatchKernels = {MatchKernel::kPortable, MatchKernel
                                              MatchKernel::kAmx,      MatchKernel::kNeonDot};
 // "portable", "avx2", "avx_vnni", "avx512_vnni", "amx", "neon_dot".
 std::string_view NameOf(MatchKernel kernel);
-// Whether this program contains it and this processor can run it.
+// Whether this program contains it and this processor can run it.  Of kAmx the process asks Linux for the
+// registers of tiles, which it then keeps: signal stacks of its threads (sigaltstack) need 8 KiB more.
 bool IsKernelSupported(MatchKernel kernel);
 // The fastest one that is supported.
 MatchKernel FastestKernel();

@@ -4,6 +4,21 @@
 
 namespace cairn {
 
+bool FloorPlan::Contains(const Eigen::Vector2d& place) const {
+  if (!closed) {
+    const Eigen::Vector2d from = Metres(low), to = Metres(high);
+    return (place.array() >= from.array()).all() && (place.array() <= to.array()).all();
+  }
+  // Walls bound it: a ray along x leaves it once more than it enters.
+  bool inside = false;
+  for (const PlanWall& wall : walls) {
+    if ((wall.start.y() > place.y()) == (wall.end.y() > place.y())) continue;
+    const double share = (place.y() - wall.start.y()) / (wall.end.y() - wall.start.y());
+    if (wall.start.x() + share * (wall.end.x() - wall.start.x()) > place.x()) inside = !inside;
+  }
+  return inside;
+}
+
 Status CheckFloorPlan(const FloorPlan& plan, const std::string& what) {
   if (!(plan.grid_m > 0) || !plan.origin.allFinite()) return Corrupt(what, "the plan's grid is not a grid");
   const auto on_grid = [](const GridPoint& point) {

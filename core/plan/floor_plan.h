@@ -68,6 +68,8 @@ struct FloorPlan {
   Eigen::Vector2d Metres(const GridPoint& point) const {
     return Metres(static_cast<double>(point.x), static_cast<double>(point.y));
   }
+  // Whether a place (metres) lies in the domain; on its border, either.  O(walls).
+  bool Contains(const Eigen::Vector2d& place) const;
   // Real-valued grid coordinates.
   Eigen::Vector2d Grid(const Eigen::Vector2d& metres) const { return (metres - origin) / grid_m; }
 };

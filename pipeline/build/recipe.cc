@@ -41,7 +41,8 @@ constexpr Key kCaptureKeys[] = {
      "its images). Default \"shared\"."},
     {"floor_plan", "text",
      "Floor plan of the place (GeoJSON polygons, or lines x0,y0,x1,y1 of walls; metres), relative to the "
-     "recipe: the map then has its view-invariant regions ([floor plans](views.md)). One plan serves all "
+     "recipe: the map then has its walls, for robots with a laser ([floor plans](floor_plans.md)). One plan "
+     "serves all "
      "captures. Default: none."},
     {"up", "text or list",
      "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]; the "

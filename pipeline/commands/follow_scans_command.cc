@@ -12,13 +12,13 @@
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "core/images/image_file.h"
+#include "pipeline/commands/open_plan.h"
 #include "pipeline/commands/query_images.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/belief/image_places.h"
 #include "runtime/belief/plan_tracker.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/map/map.h"
-#include "runtime/map/open_views.h"
 #include "runtime/scans/read_scans.h"
 #include "stages/decompose_views/picture.h"
 
@@ -62,10 +62,8 @@ class FollowedImages {
                        arguments.images, opened.names_.size(), num_scans, arguments.scans);
     }
     Result<std::shared_ptr<const Map>> map = Map::Open(arguments.views);
-    if (!map.ok()) {
-      return MakeError(map.error().code, "--images needs a map that was compiled with a floor plan: {}",
-                       map.error().message);
-    }
+    if (!map.ok())
+      return MakeError(map.error().code, "--images are localized in a map: {}", map.error().message);
     opened.map_ = std::move(*map);
     CAIRN_ASSIGN_OR_RETURN(opened.cameras_,
                            CameraChoice::Make(arguments.camera, arguments.cameras_path, opened.map_));
@@ -150,7 +148,8 @@ Status CheckArguments(const FollowArguments& arguments) {
 Status RunFollow(const FollowArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_RETURN_IF_ERROR(CheckArguments(arguments));
-  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> views, OpenViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> views,
+                         OpenPlanFor(arguments.views, arguments.options.locator, environment));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ScanView> scans,
                          ReadScans(arguments.scans, arguments.segment_options));
   const int num_scans = static_cast<int>(scans.size());
@@ -220,10 +219,12 @@ Command FollowScansCommand() {
   command.name = "follow";
   command.summary = "Find a robot in a floor plan by its scans and wheels, and follow it";
   command.add_arguments = [arguments](ArgumentParser& parser) {
-    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+    parser.Add("views", arguments->views, "the plan (views.db, or a map that has it)")
         .Required()
         .Type("FILE");
-    parser.Add("scans", arguments->scans, "Carmen log with odometry").Required().Type("FILE");
+    parser.Add("scans", arguments->scans, "Carmen log, or LaserScan and Odometry messages as JSON lines")
+        .Required()
+        .Type("FILE");
     parser.Add("--start", arguments->start, "number of the first scan, from 0").Type("INT");
     parser
         .Add("--images", arguments->images,

@@ -11,6 +11,7 @@
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "core/plan/views.h"
+#include "pipeline/commands/open_plan.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/beams/scan_locator.h"
 #include "runtime/map/open_views.h"
@@ -18,6 +19,13 @@
 #include "stages/decompose_views/picture.h"
 
 namespace cairn::pipeline {
+
+Result<std::shared_ptr<const Views>> OpenPlanFor(const std::string& path, const ScanLocatorOptions& options,
+                                                 const CommandEnvironment& environment) {
+  if (options.search != "vir") return OpenPlan(path);
+  return OpenViews(path, environment.num_threads, environment.memory_mib, *environment.progress);
+}
+
 namespace {
 
 using nlohmann::ordered_json;
@@ -34,24 +42,26 @@ struct LocateScanArguments {
   OptionArguments option_arguments;
 };
 
-ordered_json HypothesisJson(const ScanHypothesis& found, FaceIdx region) {
+// `regions`: null where the plan has none.
+ordered_json HypothesisJson(const ScanHypothesis& found, const FaceLocator* regions) {
   ordered_json covariance = ordered_json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) covariance.push_back(found.covariance(row, column));
   }
-  return {{"x", found.pose.position.x()},
-          {"y", found.pose.position.y()},
-          {"heading_deg", DegFromRad(found.pose.heading_rad)},
-          {"probability", found.probability},
-          {"determined", found.determined},
-          {"explained", found.explained_ratio},
-          {"matched", found.num_matched},
-          {"matched_length_m", found.matched_length_m},
-          {"hidden_length_m", found.hidden_length_m},
-          {"rms_m", found.rms_m},
-          {"region", region},
-          {"labels", found.labels},
-          {"covariance", covariance}};
+  ordered_json json = {{"x", found.pose.position.x()},
+                       {"y", found.pose.position.y()},
+                       {"heading_deg", DegFromRad(found.pose.heading_rad)},
+                       {"probability", found.probability},
+                       {"determined", found.determined},
+                       {"explained", found.explained_ratio},
+                       {"matched", found.num_matched},
+                       {"matched_length_m", found.matched_length_m},
+                       {"hidden_length_m", found.hidden_length_m},
+                       {"rms_m", found.rms_m},
+                       {"labels", found.labels},
+                       {"covariance", covariance}};
+  if (regions != nullptr) json["region"] = regions->Find(found.pose.position);
+  return json;
 }
 
 decompose_views::ViewsOverlay Overlay(const ScanView& scan, const LocatedScan& result) {
@@ -89,7 +99,8 @@ Result<std::pair<int, int>> ChosenScans(const LocateScanArguments& arguments, in
 
 Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened,
+                         OpenPlanFor(arguments.views, arguments.locator_options, environment));
   const Views& views = *opened;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ScanView> scans,
                          ReadScans(arguments.scans, arguments.segment_options));
@@ -98,7 +109,8 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
   const auto locator = ScanLocator::Make(views, arguments.locator_options);
   if (!locator.ok())
     return MakeError(locator.error().code, "{}: {}", arguments.views, locator.error().message);
-  const FaceLocator regions(views);
+  std::optional<FaceLocator> regions;
+  if (views.num_faces() > 0) regions.emplace(views);
   int64_t num_located = 0;
   environment.progress->Begin("locate-scan", end - first, "scans");
   // A batch on all threads, then its lines in order.
@@ -124,7 +136,7 @@ Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironm
       } else {
         ordered_json solutions = ordered_json::array();
         for (const ScanHypothesis& found : result->hypotheses)
-          solutions.push_back(HypothesisJson(found, regions.Find(found.pose.position)));
+          solutions.push_back(HypothesisJson(found, regions ? &*regions : nullptr));
         num_located += !result->hypotheses.empty();
         line["tried"] = result->num_tried;
         line["complete"] = result->complete;
@@ -153,12 +165,13 @@ Command LocateScanCommand() {
   command.former_names = {"locate-scan"};
   command.summary = "Find where a laser scan was taken in a floor plan";
   command.add_arguments = [arguments](ArgumentParser& parser) {
-    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+    parser.Add("views", arguments->views, "the plan (views.db, or a map that has it)")
         .Required()
         .Type("FILE");
     parser
         .Add("scans", arguments->scans,
-             "Carmen log, or lines x0,y0,x1,y1 of the walls seen (robot frame, metres)")
+             "Carmen log, LaserScan messages as JSON lines, or lines x0,y0,x1,y1 of the walls seen (robot "
+             "frame, metres)")
         .Required()
         .Type("FILE");
     // As text, for one error that says how many scans there are.

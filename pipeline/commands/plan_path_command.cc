@@ -51,7 +51,9 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"max_num_places"}, "is for --kind min-link and search; leave it out, or change the kind"));
   }
-  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::shared_ptr<const Views> opened,
+      OpenViews(arguments.views, environment.num_threads, environment.memory_mib, *environment.progress));
   const Views& views = *opened;
   const PlanSpace space(views);
   const Vec2 from(arguments.from[0], arguments.from[1]);
@@ -140,7 +142,9 @@ std::string Drawn(const Views& views, const PlanarPose& a, const PlanarPose& b,
 
 Status RunApart(const ApartArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::shared_ptr<const Views> opened,
+      OpenViews(arguments.views, environment.num_threads, environment.memory_mib, *environment.progress));
   const Views& views = *opened;
   const PlanSpace space(views);
   CAIRN_ASSIGN_OR_RETURN(const PlanarPose a, ParsePose("--a", arguments.a));
@@ -177,7 +181,7 @@ Command PlanPathCommand() {
   command.former_names = {"plan-path"};
   command.summary = "Plan a path: a short one, one with few turns, or one that sees everything";
   command.add_arguments = [arguments](ArgumentParser& parser) {
-    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+    parser.Add("views", arguments->views, "the plan (views.db, or a map that has it)")
         .Required()
         .Type("FILE");
     parser.Add("--from", arguments->from, "start, metres")
@@ -204,7 +208,7 @@ Command TellApartCommand() {
   command.name = "tell-apart";
   command.summary = "Plan where to go to tell which of two poses is the right one";
   command.add_arguments = [arguments](ArgumentParser& parser) {
-    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+    parser.Add("views", arguments->views, "the plan (views.db, or a map that has it)")
         .Required()
         .Type("FILE");
     parser.Add("--a", arguments->a, "a pose, metres and degrees")

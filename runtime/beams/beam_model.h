@@ -29,6 +29,7 @@ struct BeamEvidence {
 struct WeighedPose {
   PlanarPose pose;
   BeamEvidence evidence;
+  bool is_expected = false;  // it is, or is the same as, one that was looked for where it was expected
 };
 
 // What a laser measures at a pose in a plan: a beam ends at the first wall in its way, or before it at

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "core/plan/floor_plan.h"
-#include "runtime/beams/wall_cells.h"
+#include "core/plan/wall_cells.h"
 
 namespace cairn {
 

@@ -94,10 +94,14 @@ void BestFirst(std::vector<WeighedPose>* poses) {
 void RemoveTheSame(std::vector<WeighedPose>* poses) {
   std::vector<WeighedPose> kept;
   for (const WeighedPose& pose : *poses) {
-    const bool same = std::any_of(kept.begin(), kept.end(), [&](const WeighedPose& other) {
+    const auto same = std::find_if(kept.begin(), kept.end(), [&](const WeighedPose& other) {
       return AreTheSame(other.pose, pose.pose);
     });
-    if (!same) kept.push_back(pose);
+    if (same == kept.end()) {
+      kept.push_back(pose);
+    } else {
+      same->is_expected = same->is_expected || pose.is_expected;
+    }
   }
   *poses = std::move(kept);
 }
@@ -116,14 +120,25 @@ struct PoseGroup {
   double low_m = 0, high_m = 0;  // of the row, from the best along it
 };
 
-// Groups of poses, which are the best first.  `covariance_of(pose)`, `weight`: of a beam.
-template <typename CovarianceOf>
-std::vector<PoseGroup> GroupPoses(const std::vector<WeighedPose>& poses, double weight, size_t most,
-                                  CovarianceOf&& covariance_of) {
+struct PoseGroups {
   std::vector<PoseGroup> groups;
+  bool complete = true;  // false: more than `most` were not expected
+};
+
+// Groups of poses, which are the best first: `most` of them, and all with an expected pose.
+// `covariance_of(pose)`, `weight`: of a beam.
+template <typename CovarianceOf>
+PoseGroups GroupPoses(const std::vector<WeighedPose>& poses, double weight, size_t most,
+                      CovarianceOf&& covariance_of) {
+  PoseGroups found;
+  size_t num_others = 0;
   std::vector<char> taken(poses.size(), 0);
-  for (size_t i = 0; i < poses.size() && groups.size() < most; ++i) {
+  for (size_t i = 0; i < poses.size(); ++i) {
     if (taken[i] != 0) continue;
+    if (!poses[i].is_expected && num_others == most) {
+      found.complete = false;
+      continue;
+    }
     PoseGroup group{poses[i]};
     const auto [along, sigma] = LeastKnown(covariance_of(poses[i]));
     if (sigma > kKnownM) {
@@ -145,12 +160,16 @@ std::vector<PoseGroup> GroupPoses(const std::vector<WeighedPose>& poses, double 
       while (std::next(last) != row.end() && std::next(last)->first - last->first < kRowGapM) ++last;
       group.low_m = first->first;
       group.high_m = last->first;
-      for (auto member = first; member <= last; ++member) taken[member->second] = 1;
+      for (auto member = first; member <= last; ++member) {
+        taken[member->second] = 1;
+        group.best.is_expected = group.best.is_expected || poses[member->second].is_expected;
+      }
     }
     taken[i] = 1;
-    groups.push_back(group);
+    num_others += group.best.is_expected ? 0 : 1;
+    found.groups.push_back(group);
   }
-  return groups;
+  return found;
 }
 
 // A group's hypothesis: of a row its middle, as uncertain along it as it is long.
@@ -161,7 +180,10 @@ void SpreadAlong(const PoseGroup& group, ScanHypothesis* found) {
   if (group.along == Vec2::Zero() || sigma <= kKnownM) return;
   found->pose.position += 0.5 * (group.low_m + group.high_m) * group.along;
   const double variance = length * length / 12 + kSameM * kSameM;  // of a uniform distribution
-  found->covariance.topLeftCorner<2, 2>() += (variance - sigma * sigma) * along * along.transpose();
+  // Along it the row's length is the standard deviation; what the heading errs with it becomes as much less.
+  Eigen::Matrix3d scaling = Eigen::Matrix3d::Identity();
+  scaling.topLeftCorner<2, 2>() += (std::sqrt(variance) / sigma - 1) * along * along.transpose();
+  found->covariance = (scaling * found->covariance * scaling.transpose()).eval();
   found->probability *= std::max(1.0, length / kRowUnitM);
 }
 
@@ -212,6 +234,10 @@ Result<ScanLocator> ScanLocator::Make(const Views& views, const ScanLocatorOptio
   ScanLocatorOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (views.plan.walls.empty()) return MakeError(ErrorCode::kNoData, "a plan without walls");
+  if (options.search == "vir" && views.num_faces() == 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "search = vir looks in a plan's regions, but only its walls are given");
+  }
   const Vec2 size = ExtentOf(views.plan.walls);
   if (!(size.prod() <= kMaxAreaM2)) {
     return MakeError(
@@ -314,41 +340,50 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
   } else if (searches) {
     CAIRN_ASSIGN_OR_RETURN(weighed, PosesBySegments(scan, few, &located));
   }
+  for (const PlanarPose& pose : expected) {
+    weighed.push_back(BestNear(pose, ends, few));
+    weighed.back().is_expected = true;
+  }
   BestFirst(&weighed);
   RemoveTheSame(&weighed);
-  std::vector<WeighedPose> near;
-  for (const PlanarPose& pose : expected) near.push_back(BestNear(pose, ends, few));
-  BestFirst(&near);
-  RemoveTheSame(&near);
   const double weight = WeightOfABeam(scan.beams);
   const auto covariance_of = [&](const WeighedPose& pose) {
     return model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
   };
   const std::vector<Beam> refining = SomeOf(scan.beams, kMaxNumBeamsRefined);
-  std::vector<PoseGroup> groups = GroupPoses(weighed, WeightOfABeam(few), kNumRefined, covariance_of);
-  const bool all_refined = groups.size() < kNumRefined;
-  for (const PoseGroup& group : GroupPoses(near, WeightOfABeam(few), near.size(), covariance_of))
-    groups.push_back(group);
+  const PoseGroups grouped = GroupPoses(weighed, WeightOfABeam(few), kNumRefined, covariance_of);
+  std::vector<PoseGroup> groups = grouped.groups;
   for (PoseGroup& group : groups) {
     PlanarPose refined = group.best.pose;
     for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
     const WeighedPose before = Weighed(scan.beams, group.best.pose), after = Weighed(scan.beams, refined);
+    const bool is_expected = group.best.is_expected;
     group.best = after.evidence.log_likelihood > before.evidence.log_likelihood ? after : before;
+    group.best.is_expected = is_expected;
   }
   std::stable_sort(groups.begin(), groups.end(), [](const PoseGroup& a, const PoseGroup& b) {
     return a.best.evidence.log_likelihood > b.best.evidence.log_likelihood;
   });
-  for (auto group = groups.begin(); group != groups.end(); ++group) {
-    if (std::any_of(groups.begin(), group,
-                    [&](const PoseGroup& better) { return AreTheSame(better.best.pose, group->best.pose); }))
-      continue;
+  std::vector<PoseGroup> apart;
+  for (const PoseGroup& group : groups) {
+    const auto better = std::find_if(apart.begin(), apart.end(), [&](const PoseGroup& other) {
+      return AreTheSame(other.best.pose, group.best.pose);
+    });
+    if (better == apart.end()) {
+      apart.push_back(group);
+    } else {
+      better->best.is_expected = better->best.is_expected || group.best.is_expected;
+    }
+  }
+  for (const PoseGroup& group : apart) {
     ScanHypothesis found;
-    found.pose = group->best.pose;
-    found.explained_ratio = group->best.evidence.explained_ratio;
-    found.probability = std::exp(
-        weight * (group->best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
-    found.covariance = covariance_of(group->best);
-    SpreadAlong(*group, &found);
+    found.pose = group.best.pose;
+    found.explained_ratio = group.best.evidence.explained_ratio;
+    found.is_expected = group.best.is_expected;
+    found.probability =
+        std::exp(weight * (group.best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
+    found.covariance = covariance_of(group.best);
+    SpreadAlong(group, &found);
     located.hypotheses.push_back(std::move(found));
   }
   if (located.hypotheses.empty()) return located;
@@ -360,14 +395,15 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
   double sum = std::exp(kByChance - evidence);
   for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;
   const double least = options_.least_odds * located.hypotheses.front().probability;
-  // Where not all were refined, the others are no less likely than the last.
-  if (!all_refined && located.hypotheses.back().probability >= least) located.complete = false;
+  // Where not all were refined, the others are no less likely than the last that was.
+  double last = 0;
   int num_kept = 0;
   std::erase_if(located.hypotheses, [&](const ScanHypothesis& found) {
-    const bool is_expected = std::any_of(
-        near.begin(), near.end(), [&](const WeighedPose& pose) { return AreTheSame(pose.pose, found.pose); });
-    return !is_expected && (found.probability < least || ++num_kept > kMaxNumHypotheses);
+    if (found.is_expected) return false;
+    last = found.probability;
+    return found.probability < least || ++num_kept > kMaxNumHypotheses;
   });
+  if (!grouped.complete && last >= least) located.complete = false;
   for (ScanHypothesis& found : located.hypotheses) {
     found.probability /= sum;
     Interpret(scan.segments, &found);

@@ -39,6 +39,7 @@ OptionTable DescribeOptions(ScanLocatorOptions* options);
 struct ScanHypothesis : Interpretation {
   double probability = 0;      // among all hypotheses, and a place that the plan does not show
   double explained_ratio = 0;  // of the beams that met something: those that ended at walls of the plan
+  bool is_expected = false;    // of Locate's `expected`, or in a row with one of them
 };
 
 // Whether a place is known: of a covariance of x, y (m) and heading (rad), no standard deviation is more than
@@ -59,8 +60,8 @@ struct LocatedScan {
 class ScanLocator {
  public:
   // `views` outlives this.  By beams, only their plan's walls are read.
-  // Errors: InvalidArgument (options), NoData (no wall), Unsupported (a plan of more than 0.5 square
-  // kilometres: of millimetres?).
+  // Errors: InvalidArgument (options, "vir" without regions), NoData (no wall), Unsupported (a plan of more
+  // than 0.5 square kilometres: of millimetres?).
   static Result<ScanLocator> Make(const Views& views, const ScanLocatorOptions& options);
 
   // `expected`: where it may have been, besides the poses that are searched for; hypotheses near to these are

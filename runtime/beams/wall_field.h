@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "runtime/beams/wall_cells.h"
+#include "core/plan/wall_cells.h"
 
 namespace cairn {
 

@@ -11,28 +11,8 @@
 namespace cairn {
 namespace {
 
-// Ways and turns whose errors are independent of those before (WheelErrorOptions).
-constexpr double kWayM = 0.5, kBeside = 1.0 / 3;
-constexpr double kTurnRad = 20 * std::numbers::pi / 180;
 // Places of a belief from which the laser is looked for.
 constexpr int kMaxNumExpected = 60;
-
-UncertainPlanarPose StepOf(const FloorMotion& motion, const WheelErrorOptions& errors) {
-  UncertainPlanarPose step;
-  step.pose = {motion.way_m, motion.turn_left_rad};
-  const double way_m = motion.way_m.norm();
-  if (way_m > 0) {
-    const Eigen::Vector2d along = motion.way_m / way_m, beside(-along.y(), along.x());
-    step.covariance.topLeftCorner<2, 2>() =
-        errors.wheel_way_ratio * errors.wheel_way_ratio * kWayM * way_m *
-        (along * along.transpose() + kBeside * kBeside * beside * beside.transpose());
-  }
-  const double drift_rad = RadFromDeg(errors.wheel_drift_deg);
-  step.covariance(2, 2) =
-      errors.wheel_turn_ratio * errors.wheel_turn_ratio * kTurnRad * std::abs(motion.turn_left_rad) +
-      drift_rad * drift_rad / kWayM * way_m;
-  return step;
-}
 
 // What wheels err by in any case.
 UncertainPlanarPose StandingStill(const WheelErrorOptions& errors) {
@@ -76,7 +56,7 @@ Result<PlanTracker> PlanTracker::Make(const Views& views, const PlanTrackerOptio
 Status PlanTracker::Move(const FloorMotion& motion) {
   if (!motion.way_m.allFinite() || !std::isfinite(motion.turn_left_rad))
     return MakeError(ErrorCode::kInvalidArgument, "a motion that is not finite");
-  belief_.Move(StepOf(motion, options_.wheels));
+  belief_.Move({{motion.way_m, motion.turn_left_rad}, WheelCovariance(motion, options_.wheels)});
   for (SinceLook* since : {&since_scan_, &since_image_}) {
     since->way_m += motion.way_m.norm();
     since->turn_rad += std::abs(motion.turn_left_rad);

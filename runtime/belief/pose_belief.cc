@@ -14,14 +14,14 @@ namespace {
 
 // Poses nearer to each other than so many standard deviations squared, by the better one's covariance and a
 // little, are one.
-constexpr double kSameSquared = 4;
+constexpr double kOnePlaceSquared = 4;
 // A place that is seen within so many standard deviations squared of an expected one is that one.
 constexpr double kNearSquared = 16;
-// Wheels slip: a share of moves errs by so much more, squared.
+// A share of places errs by so much more than it says, squared: wheels slip.
 constexpr double kSlips = 0.05, kSlipSquared = 9;
 // What agrees less than this with a place is left out: anything that is seen weighs about 1, or far more.
 constexpr double kLeastTogether = 1e-12;
-constexpr double kSameM = 0.1, kSameRad = 3 * std::numbers::pi / 180;
+constexpr double kOnePlaceM = 0.1, kOnePlaceRad = 3 * std::numbers::pi / 180;
 
 Eigen::Vector3d Difference(const PlanarPose& a, const PlanarPose& b) {
   Eigen::Vector3d difference;
@@ -61,15 +61,17 @@ bool IsWithin(const UncertainPlanarPose& a, const UncertainPlanarPose& b, double
   return apart.dot((a.covariance + b.covariance).ldlt().solve(apart)) < squared;
 }
 
-bool AreTheSame(const UncertainPlanarPose& better, const UncertainPlanarPose& other) {
+bool AreOnePlace(const UncertainPlanarPose& better, const UncertainPlanarPose& other) {
   const Eigen::Vector3d apart = Difference(other.pose, better.pose);
   const Eigen::Matrix3d least =
-      Eigen::Vector3d(kSameM * kSameM, kSameM * kSameM, kSameRad * kSameRad).asDiagonal();
-  const Eigen::Matrix3d covariance = better.covariance + least / kSameSquared;
-  return apart.dot(covariance.ldlt().solve(apart)) < kSameSquared;
+      Eigen::Vector3d(kOnePlaceM * kOnePlaceM, kOnePlaceM * kOnePlaceM, kOnePlaceRad * kOnePlaceRad)
+          .asDiagonal();
+  const Eigen::Matrix3d covariance = better.covariance + least / kOnePlaceSquared;
+  return apart.dot(covariance.ldlt().solve(apart)) < kOnePlaceSquared;
 }
 
-// A place, where the likeliest of what is seen near to it says that it is.
+// A place, where the likeliest of what is seen near to it says that it is; known as well as by that alone, as
+// looks from one place err together.
 UncertainPlanarPose Corrected(const UncertainPlanarPose& place, std::span<const PossiblePlace> seen) {
   double most = 0;
   UncertainPlanarPose corrected = place;
@@ -78,7 +80,8 @@ UncertainPlanarPose Corrected(const UncertainPlanarPose& place, std::span<const 
     const Agreement agreement = Agree(place, near);
     if (!(near.probability * agreement.density > most)) continue;
     most = near.probability * agreement.density;
-    corrected = agreement.both;
+    corrected = {agreement.both.pose,
+                 near.covariance.trace() < place.covariance.trace() ? near.covariance : place.covariance};
   }
   return corrected;
 }
@@ -123,7 +126,17 @@ void PoseBelief::Move(const UncertainPlanarPose& next_from_last) {
   }
 }
 
-void PoseBelief::Update(std::span<const PossiblePlace> seen) {
+void PoseBelief::Update(std::span<const PossiblePlace> told) {
+  std::vector<PossiblePlace> seen;
+  double sum_seen = 0;
+  for (const PossiblePlace& place : told) {
+    if (!place.pose.position.allFinite() || !std::isfinite(place.pose.heading_rad) ||
+        !place.covariance.allFinite() || !(place.probability > 0 && std::isfinite(place.probability)))
+      continue;
+    seen.push_back(place);
+    sum_seen += place.probability;
+  }
+  for (PossiblePlace& place : seen) place.probability /= std::max(1.0, sum_seen);
   for (PossiblePlace& place : places_) place.probability *= 1 - options_.lost_ratio;
   elsewhere_ += options_.lost_ratio * (1 - elsewhere_);
   const double trust = 1 - options_.surprise_ratio;
@@ -166,10 +179,11 @@ void PoseBelief::Tidy() {
   });
   std::vector<PossiblePlace> kept;
   double sum = elsewhere_;
+  for (const PossiblePlace& place : places_) sum += place.probability;
   for (const PossiblePlace& place : places_) {
-    sum += place.probability;
+    if (place.probability < options_.least_probability * sum) break;
     const auto same = std::find_if(kept.begin(), kept.end(),
-                                   [&](const PossiblePlace& better) { return AreTheSame(better, place); });
+                                   [&](const PossiblePlace& better) { return AreOnePlace(better, place); });
     if (same != kept.end()) {
       same->probability += place.probability;
     } else if (std::ssize(kept) < options_.max_num_places) {
@@ -178,9 +192,6 @@ void PoseBelief::Tidy() {
   }
   places_ = std::move(kept);
   double total = 0;
-  std::erase_if(places_, [&](const PossiblePlace& place) {
-    return place.probability < options_.least_probability * sum;
-  });
   for (const PossiblePlace& place : places_) total += place.probability;
   total += elsewhere_;
   for (PossiblePlace& place : places_) place.probability /= total;

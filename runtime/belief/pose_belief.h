@@ -50,11 +50,12 @@ class PoseBelief {
   void Move(const UncertainPlanarPose& next_from_last);
 
   // A look that says by itself, had the robot been anywhere, that it is at one of these places; what their
-  // probabilities lack of 1 is for a place that the look does not know.
-  void Update(std::span<const PossiblePlace> seen);
+  // probabilities lack of 1 is for a place that the look does not know.  What is not finite is left out;
+  // probabilities of more than 1 in all are made 1.
+  void Update(std::span<const PossiblePlace> told);
 
   // Moves places to those that a look shows near to them, without another word on which place it is: as a
-  // look from where the last one was taken, which errs as that did.
+  // look from where the last one was taken, which errs as that did.  Both are known no better than by one.
   void Correct(std::span<const PossiblePlace> seen);
 
   // The most probable first; with elsewhere() they sum to 1.

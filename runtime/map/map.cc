@@ -18,6 +18,7 @@
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
 #include "core/plan/views.h"
+#include "core/view_regions/derive_views.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/block_cache.h"
 #include "runtime/map/landmark_set.h"
@@ -28,7 +29,8 @@ namespace {
 // In the cache, beside the numbers of blocks.
 constexpr int64_t kAllLandmarks = -1;
 constexpr int64_t kWholeAppearance = -2;
-constexpr int64_t kWholeViews = -3;
+constexpr int64_t kStoredPlan = -3;  // with the regions that the map has
+constexpr int64_t kDerivedViews = -4;
 
 // Image sizes that a message names.
 constexpr size_t kMaxNumSizesNamed = 10;
@@ -37,6 +39,16 @@ int64_t NumBytes(const LandmarkSet& set) {
   return static_cast<int64_t>(PooledSize(set.idx.capacity() * sizeof(LandmarkIdx)) +
                               PooledSize(set.landmarks.capacity() * sizeof(MapLandmark))) +
          set.descriptors.num_bytes() + set.packed.num_bytes();
+}
+
+int64_t NumBytes(const Views& views) {
+  return static_cast<int64_t>(sizeof(Views) + views.vertices.size() * sizeof(GridPoint) +
+                              (views.face_offsets.size() + views.toggle_offsets.size()) * sizeof(int64_t) +
+                              views.face_vertices.size() * sizeof(int32_t) +
+                              (views.parents.size() + views.toggled_labels.size()) * sizeof(int32_t) +
+                              views.index.size() * sizeof(ViewIndex) +
+                              views.links.size() * sizeof(ViewLink)) +
+         NumBytes(views.plan);
 }
 
 int64_t NumBytes(const AppearanceMap& appearance) {
@@ -113,7 +125,7 @@ int64_t Map::num_images() const { return directory().Count(BlockKind::kImages); 
 int64_t Map::num_regions() const { return directory().Count(BlockKind::kRegions); }
 int64_t Map::num_kept_bytes() const { return cache().num_bytes(); }
 bool Map::has_words() const { return directory().Count(BlockKind::kVocabularyTree) > 0; }
-bool Map::has_views() const { return directory().Count(BlockKind::kViewRegions) > 0; }
+bool Map::has_floor_plan() const { return directory().Count(BlockKind::kFloorPlan) > 0; }
 bool Map::has_visual_map() const { return directory().NumBlocks(BlockKind::kLandmarkModels) > 0; }
 
 template <typename Block, typename Make>
@@ -219,9 +231,9 @@ Status Map::Store::AddAmbiguity(AppearanceMap* appearance) {
   return Ok();
 }
 
-Result<std::shared_ptr<const Views>> Map::FloorViews() const {
-  if (auto found = store_->cache.Find(kWholeViews)) return std::static_pointer_cast<const Views>(found);
-  if (!has_views()) {
+Result<std::shared_ptr<const Views>> Map::Plan() const {
+  if (auto found = store_->cache.Find(kStoredPlan)) return std::static_pointer_cast<const Views>(found);
+  if (!has_floor_plan()) {
     return MakeError(
         ErrorCode::kNotFound,
         "map '{}' has no floor plan; name one in its recipe ([[capture]] floor_plan) and compile "
@@ -242,7 +254,21 @@ Result<std::shared_ptr<const Views>> Map::FloorViews() const {
   }
   CAIRN_RETURN_IF_ERROR(CheckViews(*views, "map '" + store_->head.name + "'"));
   return std::static_pointer_cast<const Views>(
-      store_->cache.Insert(kWholeViews, std::move(views), num_bytes));
+      store_->cache.Insert(kStoredPlan, std::move(views), num_bytes));
+}
+
+Result<std::shared_ptr<const Views>> Map::FloorViews(int num_threads, int64_t memory_mib,
+                                                     Progress& progress) const {
+  CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Views> stored, Plan());
+  if (stored->num_faces() > 0) return stored;
+  if (auto found = store_->cache.Find(kDerivedViews)) return std::static_pointer_cast<const Views>(found);
+  Result<DerivedViews> derived = DeriveViews(stored->plan, num_threads, memory_mib, progress);
+  if (!derived.ok())
+    return MakeError(derived.error().code, "map '{}': {}", store_->head.name, derived.error().message);
+  auto views = std::make_shared<Views>(std::move(derived->views));
+  const int64_t num_bytes = NumBytes(*views);
+  return std::static_pointer_cast<const Views>(
+      store_->cache.Insert(kDerivedViews, std::move(views), num_bytes));
 }
 
 Result<std::shared_ptr<const VisualBlock>> Map::LandmarkModels(int64_t ordinal) const {

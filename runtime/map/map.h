@@ -27,7 +27,8 @@ struct VisualBlock;
 // core/blocks/map_rows.h:
 struct MapRows;
 struct MapImage;
-// core/plan/views.h, core/vocabulary/vocabulary_tree.h, core/world/visual_map.h:
+// core/base/progress.h, core/plan/views.h, core/vocabulary/vocabulary_tree.h, core/world/visual_map.h:
+class Progress;
 struct Views;
 struct Vocabulary;
 struct VisualMapData;
@@ -93,10 +94,15 @@ class Map {
   Result<std::shared_ptr<const AppearanceMap>> Appearance() const;
 
   // Whether there is a floor plan.
-  bool has_views() const;
-  // The whole floor plan and its view-invariant regions, floor frame.  Kept like a block.  Errors: NotFound
-  // where the map has none; Corrupt.
-  Result<std::shared_ptr<const Views>> FloorViews() const;
+  bool has_floor_plan() const;
+  // The floor plan and, where the map has them, its view-invariant regions, floor frame.  Kept like a block.
+  // Errors: NotFound where the map has no plan; Corrupt.
+  Result<std::shared_ptr<const Views>> Plan() const;
+  // The same with the regions in any case: where the map has none they are derived from the walls
+  // (core/view_regions/derive_views.h), in seconds to minutes, and kept as blocks are: where that has no room
+  // for them the next call derives them again.  Errors: those of Plan and of DeriveViews.
+  Result<std::shared_ptr<const Views>> FloorViews(int num_threads, int64_t memory_mib,
+                                                  Progress& progress) const;
 
   // Whether there is a visual map (runtime/visual_map/visual_map.h).
   bool has_visual_map() const;

@@ -18,17 +18,28 @@ bool IsMap(const std::string& path) {
   return file.read(head.data(), head.size()) && std::string_view(&head[68], 4) == "crmp";
 }
 
-}  // namespace
-
-Result<std::shared_ptr<const Views>> OpenViews(const std::string& path) {
+// By `of_map` from a map.
+template <typename OfMap>
+Result<std::shared_ptr<const Views>> Open(const std::string& path, OfMap&& of_map) {
   if (!IsMap(path)) {
     CAIRN_ASSIGN_OR_RETURN(Views views, ReadViews(path));
     return std::make_shared<const Views>(std::move(views));
   }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(path));
-  Result<std::shared_ptr<const Views>> views = map->FloorViews();
+  Result<std::shared_ptr<const Views>> views = of_map(*map);
   if (!views.ok()) return MakeError(views.error().code, "{}: {}", path, views.error().message);
   return views;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Views>> OpenPlan(const std::string& path) {
+  return Open(path, [](const Map& map) { return map.Plan(); });
+}
+
+Result<std::shared_ptr<const Views>> OpenViews(const std::string& path, int num_threads, int64_t memory_mib,
+                                               Progress& progress) {
+  return Open(path, [&](const Map& map) { return map.FloorViews(num_threads, memory_mib, progress); });
 }
 
 }  // namespace cairn

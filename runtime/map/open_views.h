@@ -4,12 +4,18 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/progress.h"
 #include "core/plan/views.h"
 
 namespace cairn {
 
-// The view-invariant regions of a floor plan, from a map that has them or from views.db; the file's contents
-// say which of the two it is.  Errors: those of Map::Open and Map::FloorViews, or of ReadViews.
-Result<std::shared_ptr<const Views>> OpenViews(const std::string& path);
+// A floor plan from a map that has one or from views.db; the file's contents say which of the two it is. With
+// its view-invariant regions where the file has them.  Errors: those of Map::Open and Map::Plan, or of
+// ReadViews.
+Result<std::shared_ptr<const Views>> OpenPlan(const std::string& path);
+
+// The same with the regions in any case.  Errors: those of Map::FloorViews too.
+Result<std::shared_ptr<const Views>> OpenViews(const std::string& path, int num_threads, int64_t memory_mib,
+                                               Progress& progress);
 
 }  // namespace cairn

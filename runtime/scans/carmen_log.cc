@@ -4,14 +4,16 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <span>
+#include <utility>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "runtime/scans/wheel_log.h"
 
 namespace cairn {
 namespace {
-
-constexpr int kMaxBeams = 100000;
 
 // A range that occurs so often, and is the largest, is what the laser says where it met nothing.
 constexpr int kNumOften = 20;
@@ -28,6 +30,9 @@ double LargestRange(const std::vector<RangeScan>& scans) {
   }
   return num >= kNumOften ? largest : std::numeric_limits<double>::infinity();
 }
+
+// Beyond what any robot measures, metres and radians.
+constexpr double kFarthest = 1e5;
 
 // A number of a message.
 Result<double> NumberOf(const std::string& word, const std::string& what, const std::string& where) {
@@ -67,96 +72,60 @@ Result<LoggedScan> ParseScan(const std::vector<std::string>& words, const std::s
   return logged;
 }
 
-// Where the wheels say that a log's scans were taken.
-class WheelLog {
- public:
-  Status AddOdometry(const std::vector<std::string>& words, const std::string& what,
-                     const std::string& where) {
-    if (words.size() < 4)
-      return Corrupt(what, "{}: ODOM with {} words; expected x, y, theta and more", where, words.size());
-    std::array<double, 3> values{};
-    for (size_t i = 0; i < values.size(); ++i) {
-      CAIRN_ASSIGN_OR_RETURN(values[i], NumberOf(words[i + 1], what, where));
-    }
-    // The third from the end, of logs with and without an acceleration.
-    double time_s = last_told_s_;
-    if (words.size() >= 7) (void)ParseNumber(words[words.size() - 3], &time_s);
-    const PlanarPose told = {{values[0], values[1]}, values[2]};
-    PlanarPose wheels = told;
-    if (!messages_.empty()) {
-      // What has no time tells a corrected pose, from which the next messages go on: nothing moved.
-      const bool moved = time_s != 0 || last_told_s_ == 0;
-      const PlanarPose& last = messages_.back().wheels;
-      wheels = moved ? Moved(last, last_told_, told) : last;
-    }
-    last_told_ = told;
-    last_told_s_ = time_s;
-    messages_.push_back({wheels, time_s});
-    return Ok();
+// Of three words.
+Result<PlanarPose> PoseOf(std::span<const std::string> words, const std::string& what,
+                          const std::string& where) {
+  std::array<double, 3> values{};
+  for (size_t i = 0; i < values.size(); ++i) {
+    CAIRN_ASSIGN_OR_RETURN(values[i], NumberOf(words[i], what, where));
   }
-  Status SetLaserOffset(const std::vector<std::string>& words, const std::string& what,
-                        const std::string& where) {
-    if (words.size() < 3) return Corrupt(what, "{}: robot_frontlaser_offset without a number", where);
-    CAIRN_ASSIGN_OR_RETURN(laser_offset_m_, NumberOf(words[2], what, where));
-    return Ok();
-  }
-  void AddScan(const LoggedScan& logged) {
-    scans_.push_back({logged.wheels, logged.scan.time_s, messages_.size()});
-    const PlanarPose& pose = logged.scan.pose;
-    told_by_scans_ = told_by_scans_ || pose.position != logged.wheels.position ||
-                     pose.heading_rad != logged.wheels.heading_rad;
-  }
+  return PlanarPose{{values[0], values[1]}, values[2]};
+}
 
-  // The laser's pose.
-  std::optional<PlanarPose> LaserAt(size_t scan) const {
-    std::optional<PlanarPose> wheels;
-    if (told_by_scans_) {
-      wheels = scans_[scan].wheels;
-    } else if (!messages_.empty()) {
-      wheels = Between(scans_[scan]);
-    }
-    if (wheels) wheels->position = wheels->FloorFromRobot({laser_offset_m_, 0});
-    return wheels;
+// ROBOTLASER1 laser_type start_angle field_of_view angular_resolution maximum_range accuracy remission_mode
+//   n r_1 ... r_n m s_1 ... s_m laser_x laser_y laser_theta robot_x robot_y robot_theta tv rv forward side
+//   turn ipc_timestamp host logger_timestamp
+Result<RangeScan> ParseRobotLaser(const std::vector<std::string>& words, const std::string& what,
+                                  const std::string& where) {
+  constexpr size_t kHead = 8, kAfter = 14;
+  int num_beams = 0, num_remissions = 0;
+  const bool has_ranges = words.size() > kHead && ParseNumber(words[kHead], &num_beams) && num_beams >= 1 &&
+                          num_beams <= kMaxBeams && words.size() > kHead + num_beams + 1;
+  if (!has_ranges || !ParseNumber(words[kHead + num_beams + 1], &num_remissions) || num_remissions < 0 ||
+      num_remissions > kMaxBeams || words.size() < kHead + num_beams + 2 + num_remissions + kAfter) {
+    return Corrupt(what,
+                   "{}: ROBOTLASER1 with {} words; expected seven values, a number of beams, their ranges, a "
+                   "number of remissions, these, two poses, five values and times",
+                   where, words.size());
   }
-
- private:
-  struct Message {
-    PlanarPose wheels;
-    double time_s = 0;
-  };
-  struct Scan {
-    PlanarPose wheels;
-    double time_s = 0;
-    size_t num_before = 0;  // messages
-  };
-
-  // By the messages before and after it in the log.
-  PlanarPose Between(const Scan& scan) const {
-    if (scan.num_before == 0) return messages_.front().wheels;
-    const Message& before = messages_[scan.num_before - 1];
-    if (scan.num_before == messages_.size()) return before.wheels;
-    const Message& after = messages_[scan.num_before];
-    const double between_s = after.time_s - before.time_s;
-    // Clocks of several computers may disagree.
-    const double share = between_s > 0 ? std::clamp((scan.time_s - before.time_s) / between_s, 0.0, 1.0) : 0;
-    return {before.wheels.position + share * (after.wheels.position - before.wheels.position),
-            WrapAngle(before.wheels.heading_rad +
-                      share * WrapAngle(after.wheels.heading_rad - before.wheels.heading_rad))};
+  RangeScan scan;
+  CAIRN_ASSIGN_OR_RETURN(scan.first_angle_rad, NumberOf(words[2], what, where));
+  CAIRN_ASSIGN_OR_RETURN(scan.step_rad, NumberOf(words[4], what, where));
+  CAIRN_ASSIGN_OR_RETURN(scan.max_range_m, NumberOf(words[5], what, where));
+  if (std::abs(scan.first_angle_rad) > kFarthest || std::abs(scan.step_rad) > kFarthest)
+    return Corrupt(what, "{}: angles from {} rad on, {} rad apart", where, words[2], words[4]);
+  for (int i = 0; i < num_beams; ++i) {
+    CAIRN_ASSIGN_OR_RETURN(const double range_m, NumberOf(words[kHead + 1 + i], what, where));
+    scan.ranges_m.push_back(range_m);
   }
+  const auto after = std::span(words).subspan(kHead + num_beams + 2 + num_remissions);
+  CAIRN_ASSIGN_OR_RETURN(scan.pose, PoseOf(after, what, where));
+  CAIRN_ASSIGN_OR_RETURN(scan.time_s, NumberOf(after[11], what, where));
+  return scan;
+}
 
-  // A pose moved as from one to another.
-  static PlanarPose Moved(const PlanarPose& pose, const PlanarPose& from, const PlanarPose& to) {
-    return {pose.FloorFromRobot(from.RobotFromFloor(to.position)),
-            WrapAngle(pose.heading_rad + to.heading_rad - from.heading_rad)};
-  }
-
-  std::vector<Message> messages_;
-  PlanarPose last_told_;
-  double last_told_s_ = 0;
-  std::vector<Scan> scans_;
-  bool told_by_scans_ = false;
-  double laser_offset_m_ = 0;
-};
+Status AddOdometry(const std::vector<std::string>& words, const std::string& what, const std::string& where,
+                   WheelLog* wheels) {
+  if (words.size() < 4)
+    return Corrupt(what, "{}: ODOM with {} words; expected x, y, theta and more", where, words.size());
+  CAIRN_ASSIGN_OR_RETURN(const PlanarPose pose, PoseOf(std::span(words).subspan(1), what, where));
+  // x y theta tv rv [accel] ipc_timestamp host logger_timestamp
+  double time_s = 0;
+  const bool has_time = (words.size() == 9 || words.size() == 10) &&
+                        ParseNumber(words[words.size() - 3], &time_s) && std::isfinite(time_s);
+  wheels->AddOdometry(pose, has_time ? std::optional(time_s) : std::nullopt);
+  return Ok();
+}
 
 }  // namespace
 
@@ -169,21 +138,28 @@ Result<std::vector<RangeScan>> ParseCarmenLog(const std::string& text, const std
     ++number;
     const std::string where = fmt::format("line {}", number);
     if (line.starts_with("ODOM ")) {
-      CAIRN_RETURN_IF_ERROR(wheels.AddOdometry(SplitWords(line), what, where));
+      CAIRN_RETURN_IF_ERROR(AddOdometry(SplitWords(line), what, where, &wheels));
     } else if (line.starts_with("PARAM robot_frontlaser_offset ")) {
-      CAIRN_RETURN_IF_ERROR(wheels.SetLaserOffset(SplitWords(line), what, where));
+      const std::vector<std::string> words = SplitWords(line);
+      if (words.size() < 3) return Corrupt(what, "{}: robot_frontlaser_offset without a number", where);
+      CAIRN_ASSIGN_OR_RETURN(const double offset_m, NumberOf(words[2], what, where));
+      wheels.SetLaserOffset(offset_m);
     } else if (line.starts_with("FLASER ")) {
-      CAIRN_ASSIGN_OR_RETURN(const LoggedScan logged, ParseScan(SplitWords(line), what, where));
-      wheels.AddScan(logged);
-      scans.push_back(logged.scan);
+      CAIRN_ASSIGN_OR_RETURN(LoggedScan logged, ParseScan(SplitWords(line), what, where));
+      wheels.AddScan(logged.scan.pose, logged.wheels, logged.scan.time_s);
+      scans.push_back(std::move(logged.scan));
+    } else if (line.starts_with("ROBOTLASER1 ")) {
+      CAIRN_ASSIGN_OR_RETURN(RangeScan scan, ParseRobotLaser(SplitWords(line), what, where));
+      wheels.AddScan(scan.pose, std::nullopt, scan.time_s);
+      scans.push_back(std::move(scan));
     }
   }
   const double largest = LargestRange(scans);
   for (size_t i = 0; i < scans.size(); ++i) {
-    scans[i].max_range_m = largest;
+    scans[i].max_range_m = std::min(scans[i].max_range_m, largest);
     scans[i].odometry = wheels.LaserAt(i);
   }
-  if (scans.empty()) return MakeError(ErrorCode::kNoData, "{}: no FLASER line in it", what);
+  if (scans.empty()) return MakeError(ErrorCode::kNoData, "{}: no FLASER or ROBOTLASER1 line in it", what);
   return scans;
 }
 

@@ -9,6 +9,7 @@
 #include "core/base/text.h"
 #include "core/files/file.h"
 #include "runtime/scans/beam.h"
+#include "runtime/scans/laser_json.h"
 
 namespace cairn {
 namespace {
@@ -53,23 +54,31 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
 }  // namespace
 
 ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options) {
-  return {FindScanSegments(scan, options), BeamsOf(scan, options.max_range_m), scan.pose, scan.odometry};
+  return {FindScanSegments(scan, options), BeamsOf(scan, options.max_range_m), scan.odometry};
 }
 
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
                                          const ScanSegmentsOptions& options) {
   std::vector<ScanView> views;
-  const bool log = text.starts_with("FLASER ") || text.find("\nFLASER ") != std::string::npos ||
-                   text.starts_with("\x1f\x8b");
-  if (!log) {
+  const auto has_line = [&](const std::string& begin) {
+    return text.starts_with(begin) || text.find("\n" + begin) != std::string::npos;
+  };
+  const bool is_json = Trim(text).starts_with('{');
+  const bool is_log = has_line("FLASER ") || has_line("ROBOTLASER1 ") || text.starts_with("\x1f\x8b");
+  if (!is_json && !is_log) {
     CAIRN_ASSIGN_OR_RETURN(ScanView view, ParseSegments(text, what, options.sigma_range_m));
-    if (view.segments.empty())
-      return MakeError(ErrorCode::kNoData, "{}: neither FLASER lines nor segments in it", what);
+    if (view.segments.empty()) {
+      return MakeError(ErrorCode::kNoData,
+                       "{}: neither scans (FLASER or ROBOTLASER1 lines, LaserScan messages as JSON) nor "
+                       "segments in it",
+                       what);
+    }
     view.beams = BeamsTo(view.segments);
     views.push_back(std::move(view));
     return views;
   }
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans, ParseCarmenLog(text, what));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans,
+                         is_json ? ParseLaserJson(text, what) : ParseCarmenLog(text, what));
   for (const RangeScan& scan : scans) views.push_back(ViewOf(scan, options));
   return views;
 }

@@ -26,11 +26,26 @@ OptionTable DescribeOptions(WheelErrorOptions* o) {
        "standard deviation of each half metre that odometry states, as part of it", 0, 10},
       {"wheel_way_sigma_m", &o->wheel_way_sigma_m, "and in any case, since the last fix, m", 1e-6},
       {"wheel_turn_ratio", &o->wheel_turn_ratio, "the same of each 20 degrees of its turns", 0, 10},
-      {"wheel_drift_deg", &o->wheel_drift_deg, "of the heading in each half metre of the way, degrees", 0,
-       90},
       {"wheel_turn_sigma_deg", &o->wheel_turn_sigma_deg, "and in any case, since the last fix, degrees",
        1e-6},
+      {"wheel_drift_deg", &o->wheel_drift_deg,
+       "standard deviation of what the heading drifts in each half metre of the way, degrees", 0, 90},
   };
+}
+
+Eigen::Matrix3d WheelCovariance(const FloorMotion& motion, const WheelErrorOptions& errors) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  const double way_m = motion.way_m.norm(), drift_rad = RadFromDeg(errors.wheel_drift_deg);
+  if (way_m > 0) {
+    const Eigen::Vector2d along = motion.way_m / way_m, beside(-along.y(), along.x());
+    covariance.topLeftCorner<2, 2>() =
+        errors.wheel_way_ratio * errors.wheel_way_ratio * kWayM * way_m *
+        (along * along.transpose() + kBeside * kBeside * beside * beside.transpose());
+  }
+  covariance(2, 2) =
+      errors.wheel_turn_ratio * errors.wheel_turn_ratio * kTurnRad * std::abs(motion.turn_left_rad) +
+      drift_rad * drift_rad / kWayM * way_m;
+  return covariance;
 }
 
 Status CheckUncertainPose(const UncertainPose& given) {
@@ -95,17 +110,11 @@ void MotionSinceFix::Add(const FloorMotion& motion, const Pose& floor_from_world
   told_ = TransformCovariance(step, told_);
   const Eigen::Matrix3d cam_from_floor = moved.rotation.conjugate().toRotationMatrix();
   const Eigen::Vector3d up = cam_from_floor.col(2);
-  told_.topLeftCorner<3, 3>() += errors.wheel_turn_ratio * errors.wheel_turn_ratio * kTurnRad *
-                                 std::abs(motion.turn_left_rad) * up * up.transpose();
-  const double way_m = way.norm(), drift_rad = RadFromDeg(errors.wheel_drift_deg);
-  told_.topLeftCorner<3, 3>() += drift_rad * drift_rad / kWayM * way_m * up * up.transpose();
-  if (way_m > 0) {
-    const Eigen::Vector3d along = cam_from_floor * Eigen::Vector3d(way.x(), way.y(), 0) / way_m;
-    const Eigen::Vector3d beside = up.cross(along);
-    told_.bottomRightCorner<3, 3>() +=
-        errors.wheel_way_ratio * errors.wheel_way_ratio * kWayM * way_m *
-        (along * along.transpose() + kBeside * kBeside * beside * beside.transpose());
-  }
+  const Eigen::Matrix3d planar = WheelCovariance({way, motion.turn_left_rad}, errors);
+  told_.topLeftCorner<3, 3>() += planar(2, 2) * up * up.transpose();
+  const Eigen::Matrix<double, 3, 2> cam_from_plane = cam_from_floor.leftCols<2>();
+  told_.bottomRightCorner<3, 3>() +=
+      cam_from_plane * planar.topLeftCorner<2, 2>() * cam_from_plane.transpose();
   now_ = step * now_;
   is_told_ = is_on_floor_ = true;
 }

@@ -53,6 +53,9 @@ struct WheelErrorOptions {
   double wheel_drift_deg = 0;
 };
 OptionTable DescribeOptions(WheelErrorOptions* options);
+// Of a motion's way, in the frame of `way_m`, and of its turn: x, y (m), turn (rad), without what it errs in
+// any case.
+Eigen::Matrix3d WheelCovariance(const FloorMotion& motion, const WheelErrorOptions& errors);
 
 // Where a camera is since it had a fix, by how it moved.
 class MotionSinceFix {

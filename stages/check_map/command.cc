@@ -263,8 +263,8 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
   if (!arguments.scans_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(scans, ReadScans(arguments.scans_path, {}));
   }
-  return CompareWithPlan(rows.views, rows.floor_from_world, report->images, scans, arguments.options,
-                         environment.num_threads, *environment.progress, &report->figures);
+  return CompareWithPlan(rows, report->images, scans, arguments.options, environment.num_threads,
+                         *environment.progress, &report->figures);
 }
 
 // Refuses arguments for held-out images or scans where there are none.

@@ -24,23 +24,22 @@ bool Agree(const FloorPose& a, const FloorPose& b, const CheckMapOptions& option
 
 }  // namespace
 
-Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
-                       const std::vector<HeldOutResult>& images, const std::vector<ScanView>& scans,
-                       const CheckMapOptions& options, int num_threads, Progress& progress,
-                       std::map<std::string, double>* figures) {
+Status CompareWithPlan(const MapRows& rows, const std::vector<HeldOutResult>& images,
+                       const std::vector<ScanView>& scans, const CheckMapOptions& options, int num_threads,
+                       Progress& progress, std::map<std::string, double>* figures) {
   if (!scans.empty() && scans.size() != images.size()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} scans for {} held-out images; scan i is to be taken with image i", scans.size(),
                      images.size());
   }
-  const FaceLocator locator(views);
   std::vector<std::optional<FloorPose>> fixes(images.size());
   int num_fixes = 0, num_free = 0;
   for (size_t i = 0; i < images.size(); ++i) {
     if (!images[i].has_fix()) continue;
-    fixes[i] = FloorPoseOf(images[i].localization.cam_from_world, floor_from_world);
+    fixes[i] =
+        FloorPoseOf(rows.camera_from_given * images[i].localization.cam_from_world, rows.floor_from_world);
     ++num_fixes;
-    num_free += locator.Find(fixes[i]->position) >= 0 ? 1 : 0;
+    num_free += rows.views.plan.Contains(fixes[i]->position) ? 1 : 0;
   }
   if (num_fixes > 0) (*figures)["plan_fixes_free_ratio"] = static_cast<double>(num_free) / num_fixes;
   if (scans.empty()) return Ok();
@@ -49,7 +48,7 @@ Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
     bool found = false, first = false, any = false;
   };
   std::vector<Outcome> outcomes(scans.size());
-  CAIRN_ASSIGN_OR_RETURN(const ScanLocator scan_locator, ScanLocator::Make(views, {}));
+  CAIRN_ASSIGN_OR_RETURN(const ScanLocator scan_locator, ScanLocator::Make(rows.views, {}));
   progress.Begin("locating scans", static_cast<int64_t>(scans.size()), "scans");
   ParallelFor(static_cast<int64_t>(scans.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;

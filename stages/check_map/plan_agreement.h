@@ -12,9 +12,9 @@
 
 namespace cairn::check_map {
 
-// How the fixes of images and the floor plan agree; `scans` is empty, or scans[i] was taken with images[i] by
-// a laser at the pose in options.scan_x_m, scan_y_m and scan_heading_deg.  Adds to the figures
-//   plan_fixes_free_ratio: fixes that lie in a region of the plan
+// How the fixes of images and the map's floor plan agree; `scans` is empty, or scans[i] was taken with
+// images[i] by a laser at the pose in options.scan_x_m, scan_y_m and scan_heading_deg.  Adds to the figures
+//   plan_fixes_free_ratio: fixes that lie in the plan's domain
 // and with scans
 //   num_scan_fixes: scans that some pose in the plan explains
 //   num_image_and_scan_fixes: of these, such whose image has a fix too
@@ -23,9 +23,8 @@ namespace cairn::check_map {
 // A place that looks like another has several poses: the first may be the wrong one.  Same figures for any
 // number of threads.  Errors: InvalidArgument (not as many scans as images), Cancelled, those of
 // ScanLocator::Make.
-Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
-                       const std::vector<HeldOutResult>& images, const std::vector<ScanView>& scans,
-                       const CheckMapOptions& options, int num_threads, Progress& progress,
-                       std::map<std::string, double>* figures);
+Status CompareWithPlan(const MapRows& rows, const std::vector<HeldOutResult>& images,
+                       const std::vector<ScanView>& scans, const CheckMapOptions& options, int num_threads,
+                       Progress& progress, std::map<std::string, double>* figures);
 
 }  // namespace cairn::check_map

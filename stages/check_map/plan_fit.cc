@@ -217,11 +217,10 @@ Result<PlanFit> FitPlan(const MapRows& rows, const PlanFitOptions& options) {
   if (rows.views.plan.walls.empty())
     return MakeError(ErrorCode::kNoData, "map '{}' has no floor plan", rows.name);
   PlanFit fit;
-  const FaceLocator locator(rows.views);
   fit.num_images = static_cast<int>(rows.images.size());
   for (const MapImage& image : rows.images) {
     const Vec2 place = FloorPoseOf(image.cam_from_world, rows.floor_from_world).position;
-    fit.num_images_free += locator.Find(place) >= 0 ? 1 : 0;
+    fit.num_images_free += rows.views.plan.Contains(place) ? 1 : 0;
   }
   std::vector<Vec2> places = LandmarkPlaces(rows, options.plan_height_band_m);
   if (places.size() < kMinNumLandmarks) {

@@ -7,24 +7,16 @@
 #include "core/base/progress.h"
 #include "core/options/options.h"
 #include "core/plan/views.h"
+#include "core/view_regions/derive_views.h"
 #include "stages/decompose_views/merge_regions.h"
 #include "stages/decompose_views/plan/clean_plan.h"
 #include "stages/decompose_views/plan/read_plan.h"
 
 namespace cairn::decompose_views {
 
-// Divides a floor plan into the regions from all points of which a laser sees the same walls
-// (view-invariant regions, VIRs).  Before: a floor plan.  After: localization with laser scans (runtime).
-// Implements [Simsarian96 §2.2].  Differs from it: walls may stand anywhere, are seen from both sides (a
-// label is one side of one wall) and through several windows (view_boundaries.h); in a polygon that is the
-// source's definition.  Regions are faces of the arrangement: with walls that stand free two faces can have
-// one label set without all of the segments between their points having it.
-//
-// | paper                          | here                                                 |
-// | point visibility scan (I)      | FindViewBoundaries: rays from every vertex           |
-// | intersections (II)             | Arrange: snap rounding, tile by tile                 |
-// | traversal of boundaries (III)  | LabelFaces: a walk over the regions' borders         |
-// | faces (IV)                     | Arrange                                              |
+// Cleans a floor plan and divides it into the regions from all points of which a laser sees the same walls
+// (view-invariant regions, VIRs; core/view_regions/derive_views.h).  Before: a floor plan.  After:
+// localization with laser scans (runtime).  Implements [Simsarian96 §2.2].
 struct DecomposeViewsOptions {
   CleanPlanOptions clean;
   // Where the plan lies: its origin, and the direction of its x axis, counter-clockwise, in the frame of the
@@ -46,11 +38,8 @@ struct DecomposeViewsResult {
   MergeLoss loss;
 };
 
-// Pure: same plan and options, same result for any number of threads.  O(n^2 log n + I log I) for n walls
-// whose boundaries cross I times; memory is proportional to I.  Plans that take more than `memory_mib` are
-// refused: those far beyond it by a sample of their boundaries, others when all crossings are counted, before
-// they are kept.  Work is done in small parts, each reported; cancelling takes effect within one.  Errors:
-// those of CleanPlan, InvalidArgument (options), Failed (memory), Cancelled.
+// Pure: same plan and options, same result for any number of threads.  Errors: InvalidArgument (options),
+// those of CleanPlan and of DeriveViews.
 Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
                                             int num_threads, int64_t memory_mib, Progress& progress);
 

@@ -204,7 +204,7 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map.errors,
                            LearnVisualErrors(classes, rows, rows.visual_map, num_threads));
   }
-  if (inputs.views) CAIRN_RETURN_IF_ERROR(AddViews(*inputs.views, &rows));
+  if (inputs.views) CAIRN_RETURN_IF_ERROR(AddViews(*inputs.views, options.view_regions, &rows));
   if (previous != nullptr) KeepClassIds(classes, previous->rows, previous->matches, &rows);
   return rows;
 }

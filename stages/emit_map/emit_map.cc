@@ -426,12 +426,17 @@ void AddChanges(const Classes& classes, MapRows* rows) {
   }
 }
 
-Status AddViews(Views views, MapRows* rows) {
+Status AddViews(Views views, bool regions, MapRows* rows) {
   if (!IsMetric(rows->frame)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "map '{}' has no scale (unit = {}), and floor plans are in metres; give the scale to "
                      "[reconstruct] (distances, control_points), or take floor_plan out of the recipe",
                      rows->name, rows->frame.unit);
+  }
+  if (!regions) {
+    Views walls;
+    walls.plan = std::move(views.plan);
+    views = std::move(walls);
   }
   NumberVerticesByUse(&views);
   rows->views = std::move(views);

@@ -77,6 +77,9 @@ struct EmitMapOptions {
   // Models whose errors of left-out sights have a larger standard deviation are marked and count less, px.
   // REQUIRES: >= 0
   double bad_model_px = 20;
+  // Whether a map with a floor plan has its view-invariant regions too, some 50 bytes each.  Without, it has
+  // the walls alone: what locates scans by beams; the regions are derived where they are asked for.
+  bool view_regions = false;
   // An earlier map of the same survey, which the new one differs from as little as what was added allows
   // (choose/choose_after.h, previous/settle_rows.h); empty: made anew.
   std::string previous;
@@ -112,6 +115,6 @@ void AddChanges(const Classes& classes, MapRows* rows);
 
 // Puts a floor plan and its regions, floor frame, into a map.  Errors: InvalidArgument where the map's unit
 // is not the metre: plans are in metres.
-Status AddViews(Views views, MapRows* rows);
+Status AddViews(Views views, bool regions, MapRows* rows);
 
 }  // namespace cairn::emit_map

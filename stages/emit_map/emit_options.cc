@@ -99,6 +99,10 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",
        .min = 0},
+      {.name = "view_regions",
+       .value = &options->view_regions,
+       .help = "of a floor plan, store the view-invariant regions besides the walls, from which they are "
+               "derived otherwise, where they are needed"},
       {.name = "previous",
        .value = &options->previous,
        .help = "map of the same survey before a session was added: what still holds of it stays as it is, so "

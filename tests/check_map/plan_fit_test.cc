@@ -163,7 +163,10 @@ ScanView Scan(const PlanarPose& laser) {
 }
 
 TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
-  const MapRows rows = SurveyOfRoom();
+  MapRows rows = SurveyOfRoom();
+  // The capture states poses of another frame than the camera's.
+  rows.camera_from_given = {
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 3).normalized())), {0.2, 0.1, -0.3}};
   std::vector<HeldOutResult> images(2);
   std::vector<ScanView> scans;
   CheckMapOptions options;
@@ -171,7 +174,7 @@ TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
   options.scan_heading_deg = 90;
   for (size_t i = 0; i < images.size(); ++i) {
     images[i].localization.reason = NoFix::kNone;
-    images[i].localization.cam_from_world = rows.images[i].cam_from_world;
+    images[i].localization.cam_from_world = rows.camera_from_given.Inverse() * rows.images[i].cam_from_world;
     const Eigen::Vector3d center = rows.images[i].cam_from_world.Center();
     // Ahead of the camera, which heads +y; the second one's image is 2 m off.
     const Vec2 off(0, i == 1 ? 2 : 0);
@@ -179,7 +182,7 @@ TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
   }
   NoProgress progress;
   std::map<std::string, double> figures;
-  ASSERT_TRUE(CompareWithPlan(rows.views, {}, images, scans, options, 2, progress, &figures).ok());
+  ASSERT_TRUE(CompareWithPlan(rows, images, scans, options, 2, progress, &figures).ok());
   EXPECT_EQ(figures["plan_fixes_free_ratio"], 1);
   EXPECT_EQ(figures["num_scan_fixes"], 2);
   EXPECT_EQ(figures["num_image_and_scan_fixes"], 2);
@@ -187,10 +190,10 @@ TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
   EXPECT_EQ(figures["scan_any_agrees_ratio"], 0.5);
 
   images[1].localization.cam_from_world.translation.x() += 100;
-  ASSERT_TRUE(CompareWithPlan(rows.views, {}, images, {}, options, 1, progress, &figures).ok());
+  ASSERT_TRUE(CompareWithPlan(rows, images, {}, options, 1, progress, &figures).ok());
   EXPECT_EQ(figures["plan_fixes_free_ratio"], 0.5);
   scans.pop_back();
-  EXPECT_EQ(CompareWithPlan(rows.views, {}, images, scans, options, 1, progress, &figures).error().code,
+  EXPECT_EQ(CompareWithPlan(rows, images, scans, options, 1, progress, &figures).error().code,
             ErrorCode::kInvalidArgument);
 }
 

@@ -55,6 +55,48 @@ TEST(CleanPlan, MovesEndsTogetherWithinTheToleranceAndSaysHowFar) {
   EXPECT_EQ(result.plan.vertices.size(), 3u + 4u);
 }
 
+// Every end near to the inside of a wall is moved onto it, however many walls there are and wherever.
+TEST(CleanPlan, EndsNearToAnyOfManyWallsLieOnThem) {
+  Random random(7);
+  std::string text;
+  std::vector<int> lines;  // of walls that end 3 mm short of a long one
+  int line = 0;
+  for (int i = 0; i < 40; ++i) {
+    const double y = 5 * i;
+    text += fmt::format("0,{},200,{}\n", y, y + 1);
+    ++line;
+    for (int k = 0; k < 30; ++k) {
+      const double x = 1 + 6.5 * k + random.Uniform(0, 5);
+      text += fmt::format("{},{},{},{}\n", x, y + x / 200 + 0.003, x, y + x / 200 + 2);
+      lines.push_back(++line);
+    }
+  }
+  const auto result = Cleaned(text);
+  EXPECT_EQ(Count(result, PlanChangeKind::kEndOnWall), std::ssize(lines));
+  std::vector<int> moved;
+  for (const PlanChange& change : result.changes) {
+    if (change.kind != PlanChangeKind::kEndOnWall) continue;
+    moved.push_back(change.line);
+    EXPECT_NEAR(change.moved_m, 0.003, 1e-4);
+  }
+  EXPECT_EQ(moved, lines);
+}
+
+TEST(CleanPlan, TooManyWallsAreRefusedAtOnce) {
+  InputPlan input;
+  for (int i = 0; i < 200'001; ++i) input.segments.push_back({{i, 0}, {i + 0.5, 0}, i + 1});
+  NoProgress progress;
+  const auto refused = CleanPlan(input, {}, progress);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(refused.error().message, HasSubstr("200001 walls; at most 200000"));
+  InputPlan closed;
+  closed.rings.resize(2);
+  for (int i = 0; i < 100'001; ++i) {
+    for (auto& ring : closed.rings) ring.emplace_back(i, 0);
+  }
+  EXPECT_EQ(CleanPlan(closed, {}, progress).error().code, ErrorCode::kUnsupported);
+}
+
 TEST(CleanPlan, DividesWallsWhereOthersTouchOrCrossThem) {
   //        |            One wall ends 4 mm short of the horizontal one, another
   //  ------+------      crosses it: three pieces of one wall.

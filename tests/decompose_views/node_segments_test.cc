@@ -1,4 +1,4 @@
-#include "stages/decompose_views/plan/node_segments.h"
+#include "core/view_regions/node_segments.h"
 
 #include <algorithm>
 #include <memory>

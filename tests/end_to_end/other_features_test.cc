@@ -89,7 +89,7 @@ TEST_F(OtherFeatures, OfEveryTypeMakeMapsThatLocalize) {
   for (const auto& [name, kind] : kinds) {
     const json map = Inspect(name);
     EXPECT_EQ(map["descriptors"], kind);
-    EXPECT_EQ(map["format"], std::string(kind) == "sift" ? "2.7" : "3.7");
+    EXPECT_EQ(map["format"], std::string(kind) == "sift" ? "2.8" : "3.8");
     EXPECT_EQ(map["sealed"], true);
     EXPECT_GT(map["num_landmarks"], 100) << name;
     EXPECT_GE(map["self_test"]["localized_ratio"], 0.5) << name << ": held-out images by their features";

@@ -129,9 +129,9 @@ TEST_F(SealedMap, EveryEarlierFormatIsMigratedToTodays) {
     const std::string migrated = Path("migrated_" + version + ".cairn");
     const ProgramRun run = RunShell("cairn migrate " GOLDEN_DIR "/map_" + version + ".cairn -o " + migrated);
     ASSERT_EQ(run.exit_code, 0) << run.err;
-    EXPECT_THAT(run.out, HasSubstr("as version 2.7, not signed"));
+    EXPECT_THAT(run.out, HasSubstr("as version 2.8, not signed"));
     EXPECT_EQ(RunShell("cairn verify " + migrated).exit_code, 0) << version;
-    EXPECT_THAT(RunShell("cairn inspect --json " + migrated).out, HasSubstr("\"format\": \"2.7\""));
+    EXPECT_THAT(RunShell("cairn inspect --json " + migrated).out, HasSubstr("\"format\": \"2.8\""));
   }
 }
 

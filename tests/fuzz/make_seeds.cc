@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
                                    .landmarks_per_word = 1,
                                    .documents = "kept"},
                                   &example.appearance);
-    if (!rows.ok() || !emit_map::AddViews(MakeExampleViews(), &*rows).ok()) return 1;
+    if (!rows.ok() || !emit_map::AddViews(MakeExampleViews(), /*regions=*/true, &*rows).ok()) return 1;
     rows->visual_map = MakeExampleVisualMap();
     rows->findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                         {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "core/base/blob.h"
+#include "core/base/progress.h"
 #include "core/base/random.h"
 #include "core/blocks/map_blocks.h"
 #include "core/map/map_file.h"
@@ -22,6 +23,7 @@
 namespace cairn {
 namespace {
 
+constexpr int kMaxDividedWalls = 40;  // of floor plans: more take long
 constexpr int kImageSide = 400;
 constexpr size_t kCountBytes = kNumBlockKinds;
 
@@ -63,7 +65,11 @@ void TryMap(const std::string& path) {
   Localizer localizer(*map);
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera).ok();
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera, PosePrior{}).ok();
-  if (const auto views = (*map)->FloorViews(); views.ok()) (void)FaceLocator(**views).Find({0.5, 0.5});
+  if (const auto plan = (*map)->Plan(); plan.ok() && (*plan)->plan.num_walls() <= kMaxDividedWalls) {
+    NoProgress progress;
+    const auto views = (*map)->FloorViews(/*num_threads=*/1, /*memory_mib=*/64, progress);
+    if (views.ok()) (void)FaceLocator(**views).Find({0.5, 0.5});
+  }
   if (const auto visual = VisualMap::Load(**map); visual.ok())
     (void)EstimateVisualPose(**visual, {{0, {10, 20, 1}}, {2, {90, 40, 2}}}).ok();
   (void)PlanRoute(**map, 0, static_cast<int32_t>((*map)->num_images()) - 1).ok();

@@ -15,15 +15,6 @@ namespace {
 
 using geos::geom::Coordinate;
 
-double TwiceArea(const std::vector<Eigen::Vector2d>& ring) {
-  double sum = 0;
-  for (size_t i = 0; i < ring.size(); ++i) {
-    const Eigen::Vector2d a = ring[i] - ring[0], b = ring[(i + 1) % ring.size()] - ring[0];
-    sum += a.x() * b.y() - a.y() * b.x();
-  }
-  return sum;
-}
-
 std::unique_ptr<geos::geom::LinearRing> MakeRing(const geos::geom::GeometryFactory& factory,
                                                  const std::vector<Eigen::Vector2d>& ring) {
   std::vector<Coordinate> points;
@@ -34,6 +25,15 @@ std::unique_ptr<geos::geom::LinearRing> MakeRing(const geos::geom::GeometryFacto
 }
 
 }  // namespace
+
+double TwiceArea(const std::vector<Eigen::Vector2d>& ring) {
+  double sum = 0;
+  for (size_t i = 0; i < ring.size(); ++i) {
+    const Eigen::Vector2d a = ring[i] - ring[0], b = ring[(i + 1) % ring.size()] - ring[0];
+    sum += a.x() * b.y() - a.y() * b.x();
+  }
+  return sum;
+}
 
 Status CheckRings(const std::vector<std::vector<Eigen::Vector2d>>& rings) {
   try {

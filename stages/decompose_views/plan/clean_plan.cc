@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "core/base/progress.h"
+#include "core/plan/wall_cells.h"
+#include "core/view_regions/derive_views.h"
+#include "core/view_regions/node_segments.h"
 #include "stages/decompose_views/plan/check_rings.h"
 #include "stages/decompose_views/plan/join_walls.h"
-#include "stages/decompose_views/plan/node_segments.h"
 
 namespace cairn::decompose_views {
 namespace {
@@ -27,10 +29,38 @@ struct Wall {
   std::vector<GridPoint> through;  // ends of other walls on it: it bends to go through them
 };
 
+// The walls that lie near to a place.
+class WallsNear {
+ public:
+  // `reach`: how near they are all found, in units of the grid.
+  WallsNear(const std::vector<Wall>& walls, double reach) {
+    std::vector<PlanWall> lines;
+    for (const Wall& wall : walls) lines.push_back({Real(wall.start), Real(wall.end)});
+    grid_ = GridAround(lines, reach, 2 * reach, std::max<double>(kLeastNumCells, 2.0 * lines.size()));
+    cells_.resize(grid_.size());
+    for (int32_t i = 0; i < std::ssize(lines); ++i) {
+      ForCellsNear(grid_, lines[i], reach,
+                   [&](int column, int row) { cells_[grid_.Index(column, row)].push_back(i); });
+    }
+  }
+
+  // Ascending.  REQUIRES: an end that one of the walls had when this was made
+  const std::vector<int32_t>& At(const GridPoint& place) const {
+    const Eigen::Vector2i cell = grid_.CellOf(Real(place));
+    return cells_[grid_.Index(cell.x(), cell.y())];
+  }
+
+ private:
+  static constexpr double kLeastNumCells = 1024;
+
+  CellGrid grid_;
+  std::vector<std::vector<int32_t>> cells_;
+};
+
 // Cleans a plan; keeps its frame and the list of changes.
 class Cleaner {
  public:
-  Cleaner(const InputPlan& input, const CleanPlanOptions& options, const Progress& progress)
+  Cleaner(const InputPlan& input, const CleanPlanOptions& options, Progress& progress)
       : input_(input), options_(options), progress_(progress) {}
 
   Result<CleanPlanResult> Run() {
@@ -149,12 +179,17 @@ class Cleaner {
       ends[walls_[i].start].push_back({i, false});
       ends[walls_[i].end].push_back({i, true});
     }
+    // An end moves once, by no more than snap and a rounding.
+    const WallsNear walls_near(walls_, 2 * snap + 2);
+    progress_.Begin("clean", static_cast<int64_t>(ends.size()), "ends of walls");
     for (const auto& [place, users] : ends) {
       if (progress_.Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
+      progress_.Advance();
       Wall* nearest = nullptr;
       GridPoint nearest_place;
       double nearest_distance = snap;
-      for (Wall& wall : walls_) {
+      for (const int32_t index : walls_near.At(place)) {
+        Wall& wall = walls_[index];
         const std::optional<GridPoint> onto = NearestInside(wall, place, snap);
         if (!onto) continue;
         const double distance = (Real(*onto) - Real(place)).norm();
@@ -170,6 +205,7 @@ class Cleaner {
       for (const auto& [wall, is_end] : users)
         (is_end ? walls_[wall].end : walls_[wall].start) = nearest_place;
     }
+    progress_.End();
     DropWithoutLength();
     return Ok();
   }
@@ -329,7 +365,7 @@ class Cleaner {
 
   const InputPlan& input_;
   const CleanPlanOptions& options_;
-  const Progress& progress_;
+  Progress& progress_;
   std::vector<Wall> walls_;
   CleanPlanResult result_;
 };
@@ -357,7 +393,16 @@ const char* PlanChangeName(PlanChangeKind kind) {
 }
 
 Result<CleanPlanResult> CleanPlan(const InputPlan& input, const CleanPlanOptions& options,
-                                  const Progress& progress) {
+                                  Progress& progress) {
+  size_t num_walls = input.segments.size();
+  for (const std::vector<Vec2>& ring : input.rings) num_walls += ring.size();
+  if (num_walls > kMaxNumDividedWalls) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "{} walls; at most {} are divided, as what is seen is looked for between all pairs of "
+                     "their ends.  Points of a laser, and furniture, are no walls: fit lines to them, or "
+                     "divide the plan by buildings and floors",
+                     num_walls, kMaxNumDividedWalls);
+  }
   if (input.closed()) CAIRN_RETURN_IF_ERROR(CheckRings(input.rings));
   if (!input.closed() && input.segments.empty()) return MakeError(ErrorCode::kNoData, "a plan without walls");
   return Cleaner(input, options, progress).Run();

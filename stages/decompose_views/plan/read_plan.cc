@@ -7,6 +7,7 @@
 
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "stages/decompose_views/plan/check_rings.h"
 
 namespace cairn::decompose_views {
 namespace {
@@ -15,15 +16,6 @@ using nlohmann::json;
 
 constexpr double kMaxCoordinateM = 1e9;
 constexpr int kMaxDepth = 32;
-
-double TwiceArea(const std::vector<Eigen::Vector2d>& ring) {
-  double sum = 0;
-  for (size_t i = 0; i < ring.size(); ++i) {
-    const Eigen::Vector2d a = ring[i] - ring[0], b = ring[(i + 1) % ring.size()] - ring[0];
-    sum += a.x() * b.y() - a.y() * b.x();
-  }
-  return sum;
-}
 
 class GeoJsonReader {
  public:

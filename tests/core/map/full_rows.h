@@ -17,7 +17,7 @@ inline MapRows FullRows() {
                                      .landmarks_per_word = 1,
                                      .documents = "kept"},
                                     &example.appearance);
-  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), &rows).ok());
+  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), /*regions=*/true, &rows).ok());
   rows.visual_map = MakeExampleVisualMap();
   rows.name = "example";
   rows.writer = "cairn test";

@@ -72,7 +72,7 @@ MapRows Rows2_3() {
                                     {.landmarks = "regions", .words = "survey"}, &example.appearance);
   rows.name = "example";
   rows.writer = "cairn test";
-  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), &rows).ok());
+  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), /*regions=*/true, &rows).ok());
   return rows;
 }
 

@@ -192,7 +192,7 @@ TEST(MapFile, DescriptorsOfOtherKindsAreReadAsTheyWereWritten) {
           static_cast<uint8_t>(unit * (i * 7 % 11 % (kind.type == DescriptorType::kBinary ? 2 : 5)));
     rows.vocabulary = {};
     ASSERT_TRUE(WriteMapRows(rows, MapPath("kind.cairn")).ok());
-    EXPECT_EQ(SQLite::Database(MapPath("kind.cairn")).execAndGet("PRAGMA user_version").getInt(), 3007);
+    EXPECT_EQ(SQLite::Database(MapPath("kind.cairn")).execAndGet("PRAGMA user_version").getInt(), 3008);
     const Result<MapRows> read = ReadMapRows(MapPath("kind.cairn"));
     ASSERT_TRUE(read.ok()) << read.error().message;
     EXPECT_EQ(read->descriptor_kind, kind);
@@ -209,7 +209,7 @@ TEST(MapFile, DescriptorsOfAnotherWidthThanTheirKindAreNotWritten) {
 TEST(MapFile, NewerMinorVersionIsRead) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("minor.cairn")).ok());
   SQLite::Database(MapPath("minor.cairn"), SQLite::OPEN_READWRITE)
-      .exec("PRAGMA user_version = 2007; CREATE TABLE later (x); INSERT INTO later VALUES (1);");
+      .exec("PRAGMA user_version = 2099; CREATE TABLE later (x); INSERT INTO later VALUES (1);");
   const Result<MapRows> read = ReadMapRows(MapPath("minor.cairn"));
   EXPECT_TRUE(read.ok()) << read.error().message;
 }
@@ -293,6 +293,21 @@ TEST(MapFile, FloorPlansReadBackAsTheyWere) {
   ASSERT_TRUE(WriteMapRows(*read, MapPath("plan2.cairn")).ok());
   EXPECT_EQ(*ReadFile(MapPath("plan.cairn")), *ReadFile(MapPath("plan2.cairn")));
 
+  // The walls alone.
+  FloorPlan walls = rows.views.plan;
+  rows.views = Views();
+  rows.views.plan = walls;
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("walls.cairn")).ok());
+  const Result<MapRows> bare = ReadMapRows(MapPath("walls.cairn"));
+  ASSERT_TRUE(bare.ok()) << bare.error().message;
+  EXPECT_EQ(bare->views.plan.walls.size(), walls.walls.size());
+  EXPECT_EQ(bare->views.num_faces(), 0);
+  rows.views = MakeExampleViews();
+  rows.views.plan.walls.clear();
+  rows.views.plan.pieces.clear();
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("walls.cairn")).ok()) << "regions without walls";
+
+  rows.views = MakeExampleViews();
   rows.views.parents[1] = 1;
   EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "a region is its own parent";
   rows.views = MakeExampleViews();
@@ -366,12 +381,12 @@ TEST(MapFile, VerticesOfAPlanAreNumberedByUse) {
   other.links[0] = {0, 1, mixed[1], mixed[2]};
   EXPECT_FALSE(IsNumberedByUse(other));
   MapRows rows = ExampleRows();
-  ASSERT_TRUE(emit_map::AddViews(other, &rows).ok());
+  ASSERT_TRUE(emit_map::AddViews(other, /*regions=*/true, &rows).ok());
   EXPECT_EQ(rows.views.vertices, views.vertices);
   EXPECT_EQ(rows.views.face_vertices, views.face_vertices);
   EXPECT_EQ(rows.views.links, views.links);
   rows.frame.unit = "arbitrary";
-  EXPECT_EQ(emit_map::AddViews(other, &rows).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(emit_map::AddViews(other, /*regions=*/true, &rows).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST(MapFile, FailedWriteLeavesTheOldFile) {

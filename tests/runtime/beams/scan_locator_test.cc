@@ -1,7 +1,10 @@
 #include "runtime/beams/scan_locator.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
 
 #include "runtime/scans/beam.h"
 #include "tests/decompose_views/plan_fixture.h"
@@ -67,6 +70,74 @@ TEST(ScanLocator, FindsWhereAScanWasTaken) {
     for (const ScanHypothesis& other : located.hypotheses) sum += other.probability;
     EXPECT_LE(sum, 1 + 1e-9);
   }
+}
+
+TEST(ScanLocator, ExpectedPlacesAreLookedAtHoweverImprobable) {
+  const Views views = PlanOf(OddRoom());
+  const auto locator = *ScanLocator::Make(views, {});
+  Random random(1);
+  const PlanarPose pose{{3, 3}, 0.4}, wrong{{6.5, 1}, 2};
+  const ScanView scan = ScanAt(views.plan.walls, pose, &random);
+  const auto at = [](const LocatedScan& located, const PlanarPose& near) {
+    return std::find_if(located.hypotheses.begin(), located.hypotheses.end(),
+                        [&](const ScanHypothesis& found) {
+                          return (found.pose.position - near.position).norm() < 0.4 &&
+                                 std::abs(WrapAngle(found.pose.heading_rad - near.heading_rad)) < 0.3;
+                        });
+  };
+  const LocatedScan without = *locator.Locate(scan);
+  EXPECT_EQ(at(without, wrong), without.hypotheses.end());
+  EXPECT_FALSE(without.hypotheses[0].is_expected);
+  const LocatedScan with = *locator.Locate(scan, std::vector{wrong});
+  ASSERT_NE(at(with, wrong), with.hypotheses.end());
+  EXPECT_TRUE(at(with, wrong)->is_expected);
+  EXPECT_LT(at(with, wrong)->probability, 0.01);
+  EXPECT_TRUE(with.complete);
+  EXPECT_TRUE(IsAt(with.hypotheses[0], pose));
+  EXPECT_FALSE(with.hypotheses[0].is_expected);
+  EXPECT_NEAR(with.hypotheses[0].probability, without.hypotheses[0].probability, 1e-3);
+  // Near to them alone: moved to where the beams fit.
+  const PlanarPose off{{3.1, 2.95}, 0.45};
+  const LocatedScan near = *locator.LocateNear(scan, std::vector{off});
+  ASSERT_EQ(near.hypotheses.size(), 1u);
+  EXPECT_TRUE(IsAt(near.hypotheses[0], pose));
+  EXPECT_TRUE(near.hypotheses[0].is_expected);
+  EXPECT_EQ(near.num_tried, 0);
+  EXPECT_TRUE(locator.LocateNear(scan, {})->hypotheses.empty());
+}
+
+// A corridor is one place with or without knowing where in it the robot may be.
+TEST(ScanLocator, ExpectedPlacesInARowAreNotCountedTwice) {
+  const Views views = PlanOf({{{0, 0}, {40, 0}},
+                              {{40, 2}, {0, 2}},
+                              {{0, 0}, {0, 2}},
+                              {{40, 0}, {40, 2}},
+                              {{0, 10}, {9, 10}},
+                              {{9, 10}, {9, 12}},
+                              {{9, 12}, {0, 12}},
+                              {{0, 12}, {0, 10}}});
+  const auto locator = *ScanLocator::Make(views, {.least_odds = 1e-6});
+  ScanView scan;
+  for (int degree = 60; degree <= 120; ++degree) {
+    for (const double sign : {1.0, -1.0}) {
+      const Vec2 direction(std::cos(RadFromDeg(degree)), sign * std::sin(RadFromDeg(degree)));
+      scan.beams.push_back({direction, 1 / std::abs(direction.y()), true});
+    }
+  }
+  std::vector<PlanarPose> expected;
+  for (int i = 0; i < 10; ++i) expected.push_back({{6 + 3.0 * i, 1}, 0});
+  const LocatedScan without = *locator.Locate(scan), with = *locator.Locate(scan, expected);
+  const auto in_long = [](const LocatedScan& located) {
+    double sum = 0;
+    for (const ScanHypothesis& found : located.hypotheses) {
+      if (found.pose.position.y() < 5 && std::abs(found.pose.heading_rad) < 0.2) sum += found.probability;
+    }
+    return sum;
+  };
+  EXPECT_GT(in_long(without), 0.2);
+  EXPECT_NEAR(in_long(with), in_long(without), 0.1);
+  for (const ScanHypothesis& found : with.hypotheses)
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(found.covariance).eigenvalues()[0], 0);
 }
 
 TEST(ScanLocator, ADenseScanOfALargeHall) {

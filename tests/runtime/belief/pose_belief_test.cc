@@ -191,6 +191,23 @@ TEST(PoseBelief, ManyPlacesAreTheMostProbableOnes) {
   EXPECT_EQ(few.places().size(), 2u);
 }
 
+TEST(PoseBelief, WhatIsNoLookDoesNoHarm) {
+  PoseBelief belief(kAreaM2);
+  belief.Update(std::vector{Place(1, 1, 0, 0.9)});
+  PossiblePlace no_covariance = Place(1, 1, 0, 0.5);
+  no_covariance.covariance(1, 1) = NAN;
+  belief.Update(std::vector{Place(NAN, 1, 0, 0.5), Place(1, 1, INFINITY, 0.5), Place(1, 1, 0, NAN),
+                            Place(1, 1, 0, -1), no_covariance});
+  ASSERT_EQ(belief.places().size(), 1u);
+  EXPECT_NEAR(Sum(belief), 1, 1e-12);
+  belief.Update(std::vector{Place(1, 1, 0, 3), Place(5, 5, 0, 1)});  // more than 1 in all: three to one
+  EXPECT_NEAR(Sum(belief), 1, 1e-12);
+  EXPECT_GE(belief.elsewhere(), 0);
+  PoseBelief fresh(kAreaM2, {.surprise_ratio = 0.1});
+  fresh.Update(std::vector{Place(1, 1, 0, 3), Place(5, 5, 0, 1)});
+  EXPECT_NEAR(fresh.places()[0].probability, 0.9 * 0.75, 1e-12);
+}
+
 TEST(PoseBelief, CorrectionsMovePlacesAndKeepTheirWeights) {
   PoseBelief belief(kAreaM2);
   belief.Update(std::vector{Place(1, 1, 0, 0.6), Place(5, 5, 0, 0.3)});
@@ -198,7 +215,7 @@ TEST(PoseBelief, CorrectionsMovePlacesAndKeepTheirWeights) {
   // 0.2 m from the first, with the same error; a worse one as near; one that is far from all.
   belief.Correct(std::vector{Place(1.2, 1, 0, 0.01), Place(0.8, 1, 0, 0.001), Place(5, 6, 0, 0.99)});
   EXPECT_NEAR(belief.places()[0].pose.position.x(), 1.1, 1e-12);
-  EXPECT_NEAR(belief.places()[0].covariance(0, 0), 0.005, 1e-12);
+  EXPECT_NEAR(belief.places()[0].covariance(0, 0), 0.01, 1e-12);
   EXPECT_EQ(belief.places()[0].probability, first);
   EXPECT_EQ(belief.places()[1].pose.position, Eigen::Vector2d(5, 5));
   EXPECT_EQ(belief.places()[1].probability, second);

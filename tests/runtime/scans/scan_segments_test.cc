@@ -119,7 +119,7 @@ TEST(CarmenLog, OdometryAtAScansTimeIsBetweenTheMessagesAroundIt) {
   ExpectOdometry(scans[1], 2, 4, WrapAngle(3.1 + 0.25 * (2 * std::numbers::pi - 6.2)));
   ExpectOdometry(scans[2], 5, 10, -3.1);  // a clock that is ahead
   ExpectOdometry(scans[3], 5, 10, -3.1);
-  EXPECT_FALSE(Scans(scan + "1 h 1\n")[0].odometry);
+  ExpectOdometry(Scans(scan + "1 h 1\n")[0], 7, 8, 0.5);  // without any message: its pose
 }
 
 // As the logs of gridded SLAM are written: ODOM without a time states the corrected pose of the scan before.
@@ -134,6 +134,15 @@ TEST(CarmenLog, CorrectionsOfPosesMoveNothing) {
   ExpectOdometry(scans[1], 3, 0, 0);  // two metres ahead
 }
 
+TEST(CarmenLog, SeveralCorrectionsMoveNothingEither) {
+  const std::string scan = "FLASER 1 2 7 8 0 7 8 0 ";
+  const auto scans = Scans("ODOM 0 0 0 0 0 0 5 h 5\nODOM 3 0 0 0 0 0 0 h 0\nODOM 9 9 0 0 0 0 0 h 0\n" + scan +
+                           "6 h 6\nODOM 10 9 0 0 0 0 7 h 7\n" + scan + "7 h 7\n");
+  ASSERT_EQ(scans.size(), 2u);
+  ExpectOdometry(scans[0], 0.5, 0, 0);  // half way from 5 s to 7 s
+  ExpectOdometry(scans[1], 1, 0, 0);
+}
+
 TEST(CarmenLog, WheelsMoveTheLaserThatStandsAheadOfThem) {
   const std::string log = "ODOM 1 2 1.5707963267948966 0 0 0 1 h 1\nFLASER 1 2 7 8 0 7 8 0 1 h 1\n";
   ExpectOdometry(Scans("PARAM robot_frontlaser_offset 0.5 h 0\n" + log)[0], 1, 2.5, std::numbers::pi / 2);
@@ -142,6 +151,36 @@ TEST(CarmenLog, WheelsMoveTheLaserThatStandsAheadOfThem) {
   ExpectOdometry(Scans("ODOM 1 2 3\nFLASER 1 2 7 8 0 7 8 0 1 h 1\n")[0], 1, 2, 3);
   ExpectOdometry(Scans("ODOM 1 2 3 0 0 4 h 4\nFLASER 1 2 7 8 0 7 8 0 5 h 5\nODOM 2 2 3 0 0 6 h 6\n")[0], 1.5,
                  2, 3);
+}
+
+std::string RobotLaser(const std::string& beams, const std::string& after) {
+  return "ROBOTLASER1 4 -1.2 2.4 0.02 30 0.01 0 " + beams + " " + after + "\n";
+}
+
+TEST(CarmenLog, ScansOfAnyAngleAreRead) {
+  const std::string after = "1 2 0.5 0.9 1.9 0.5 0 0 0 0 0 7.25 host 7.5";
+  const auto scans = Scans(RobotLaser("3 1 2.5 30 2 10 11", after) + RobotLaser("1 4 0", after));
+  ASSERT_EQ(scans.size(), 2u);
+  EXPECT_THAT(scans[0].ranges_m, testing::ElementsAre(1, 2.5, 30));
+  EXPECT_EQ(scans[0].first_angle_rad, -1.2);
+  EXPECT_EQ(scans[0].step_rad, 0.02);
+  EXPECT_EQ(scans[0].max_range_m, 30);
+  EXPECT_EQ(scans[0].pose.position, Vec2(1, 2));
+  EXPECT_EQ(scans[0].pose.heading_rad, 0.5);
+  EXPECT_EQ(scans[0].time_s, 7.25);
+  ExpectOdometry(scans[0], 1, 2, 0.5);
+  EXPECT_THAT(scans[1].ranges_m, testing::ElementsAre(4));
+  for (const std::string& line :
+       {RobotLaser("0 0", after), RobotLaser("3 1 2 3", after), RobotLaser("1 4 -1", after),
+        RobotLaser("1 x 0", after), "ROBOTLASER1 4 -1.2 2.4 1e308 30 0.01 0 1 4 0 " + after + "\n",
+        RobotLaser("1 4 0", "1 2 0.5"), RobotLaser("100001 4 0", after),
+        RobotLaser("1 4 0", "1 nan 0.5 0.9 1.9 0.5 0 0 0 0 0 7.25 host 7.5"),
+        std::string("ROBOTLASER1 4 -1.2 2.4\n")}) {
+    const auto refused = ParseCarmenLog(line, "log");
+    ASSERT_FALSE(refused.ok()) << line;
+    EXPECT_EQ(refused.error().code, ErrorCode::kCorrupt) << line;
+    EXPECT_THAT(refused.error().message, HasSubstr("log: line 1: ")) << line;
+  }
 }
 
 TEST(CarmenLog, RefusesLinesThatAreCutShort) {

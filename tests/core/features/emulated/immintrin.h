@@ -11,9 +11,11 @@
 #define SIMDE_ENABLE_NATIVE_ALIASES
 #include <simde/x86/avx512.h>
 #define _mm256_dpbusd_avx_epi32 simde_mm256_dpbusd_epi32
+#ifndef _mm512_shldv_epi32  // of SIMD Everywhere later than Debian 12 has
 #define _mm512_shldv_epi32(a, b, bits)                  \
   simde_mm512_or_si512(simde_mm512_sllv_epi32(a, bits), \
                        simde_mm512_srlv_epi32(b, simde_mm512_sub_epi32(simde_mm512_set1_epi32(32), bits)))
+#endif
 
 namespace emulated_tiles {
 

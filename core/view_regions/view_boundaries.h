@@ -6,9 +6,9 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/plan/floor_plan.h"
-#include "stages/decompose_views/wall_rays.h"
+#include "core/view_regions/wall_rays.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // The change of the number of windows through which a label is seen.
 struct WindowChange {
@@ -42,4 +42,4 @@ struct ViewBoundary {
 Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays, int stride,
                                                      int64_t max_num, int num_threads, Progress& progress);
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

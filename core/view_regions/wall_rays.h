@@ -4,7 +4,7 @@
 
 #include "core/plan/floor_plan.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // Finds what lies along a ray or between two vertices, exactly.  Pieces lie in the cells of a grid.
 class WallRays {
@@ -49,4 +49,4 @@ class WallRays {
   std::vector<int32_t> cell_offsets_, cell_pieces_;
 };
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

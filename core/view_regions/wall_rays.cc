@@ -1,4 +1,4 @@
-#include "stages/decompose_views/wall_rays.h"
+#include "core/view_regions/wall_rays.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "core/geometry/vector_geometry.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -220,4 +220,4 @@ LabelIdx WallRays::Look(const Vec2& origin, const Vec2& direction, double* dista
   return label;
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

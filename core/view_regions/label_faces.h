@@ -5,11 +5,11 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/plan/views.h"
-#include "stages/decompose_views/arrangement.h"
-#include "stages/decompose_views/view_boundaries.h"
-#include "stages/decompose_views/wall_rays.h"
+#include "core/view_regions/arrangement.h"
+#include "core/view_regions/view_boundaries.h"
+#include "core/view_regions/wall_rays.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // How many windows each label is seen through from a point, by looking between all vertices: labels
 // ascending.  Tests compare label sets with it, and walks begin with it.  `place`: grid coordinates.
@@ -30,4 +30,4 @@ Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
                                     const std::vector<ViewBoundary>& boundaries, Arrangement arrangement,
                                     Progress& progress);
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

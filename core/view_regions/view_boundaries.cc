@@ -1,4 +1,4 @@
-#include "stages/decompose_views/view_boundaries.h"
+#include "core/view_regions/view_boundaries.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,7 +8,7 @@
 
 #include "core/base/parallel.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -285,4 +285,4 @@ Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, cons
   return boundaries;
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

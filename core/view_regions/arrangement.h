@@ -6,10 +6,10 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/plan/floor_plan.h"
-#include "stages/decompose_views/plan/node_segments.h"
-#include "stages/decompose_views/view_boundaries.h"
+#include "core/view_regions/node_segments.h"
+#include "core/view_regions/view_boundaries.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // The planar graph of walls and view boundaries, and its faces [Simsarian96 §2.2 step II, §2.2 step IV].
 struct Arrangement {
@@ -51,4 +51,4 @@ std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
 Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
                             Progress& progress);
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

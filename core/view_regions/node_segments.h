@@ -9,9 +9,9 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/plan/floor_plan.h"
-#include "stages/decompose_views/plan/segment_tiles.h"
+#include "core/view_regions/segment_tiles.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // A segment in grid coordinates (real-valued) with a tag of the caller's choice.
 struct TaggedSegment {
@@ -58,4 +58,4 @@ class SegmentNoder {
   SegmentTiles tiles_;
 };
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

@@ -1,4 +1,4 @@
-#include "stages/decompose_views/plan/node_segments.h"
+#include "core/view_regions/node_segments.h"
 
 #include <algorithm>
 #include <atomic>
@@ -9,7 +9,7 @@
 
 #include "core/base/parallel.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 constexpr int64_t kItemsPerNodingBlock = 4096;
@@ -344,4 +344,4 @@ Result<NodedSegments> SegmentNoder::Node(int num_threads, Progress& progress) co
   return Joiner(segments_, tags_, num_threads, progress).Run(&nodes);
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

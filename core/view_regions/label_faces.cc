@@ -1,4 +1,4 @@
-#include "stages/decompose_views/label_faces.h"
+#include "core/view_regions/label_faces.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "core/base/random.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -310,4 +310,4 @@ Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
   return result;
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

@@ -7,7 +7,7 @@
 
 #include "core/plan/floor_plan.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 
 // Segments by the tiles of the plane that they pass, so that each tile can be processed alone.
 //
@@ -46,4 +46,4 @@ struct SegmentTiles {
 };
 SegmentTiles MakeTiles(const std::vector<SubSegment>& segments);
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

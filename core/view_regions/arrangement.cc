@@ -1,11 +1,11 @@
-#include "stages/decompose_views/arrangement.h"
+#include "core/view_regions/arrangement.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include "core/base/parallel.h"
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -178,4 +178,4 @@ Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, in
   return arrangement;
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn

@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-// Cells of a grid, from `low` on.
+// Cells of a grid, from `low` on; in metres, or in whatever the walls are.
 struct CellGrid {
   Eigen::Vector2d low = Eigen::Vector2d::Zero();  // metres
   double cell_m = 1;

@@ -1,4 +1,4 @@
-#include "runtime/beams/wall_cells.h"
+#include "core/plan/wall_cells.h"
 
 #include <limits>
 #include <utility>

@@ -1,9 +1,9 @@
-#include "stages/decompose_views/plan/segment_tiles.h"
+#include "core/view_regions/segment_tiles.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace cairn::decompose_views {
+namespace cairn {
 namespace {
 
 using Wide = __int128;
@@ -149,4 +149,4 @@ bool CrossAt(const SubSegment& a, const SubSegment& b, GridPoint* low, GridPoint
   return true;
 }
 
-}  // namespace cairn::decompose_views
+}  // namespace cairn
