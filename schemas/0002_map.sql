@@ -1,6 +1,6 @@
 -- A map, version 2.6: what a robot opens.  Contract: FORMAT.md.
 PRAGMA application_id = 0x63726d70;  -- 'crmp'
-PRAGMA user_version = 2007;          -- 1000 * major + minor
+PRAGMA user_version = 2008;          -- 1000 * major + minor
 
 -- First, so that its only row stands in page 2: hashes and signature, 176 bytes.
 CREATE TABLE seal (

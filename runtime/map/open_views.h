@@ -4,10 +4,11 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/base/progress.h"
 #include "core/plan/views.h"
 
 namespace cairn {
+
+class Progress;  // core/base/progress.h
 
 // A floor plan from a map that has one or from views.db; the file's contents say which of the two it is. With
 // its view-invariant regions where the file has them.  Errors: those of Map::Open and Map::Plan, or of

@@ -156,7 +156,7 @@ TEST_F(OtherFeatures, HaveWordsOfTheirOwn) {
 TEST_F(OtherFeatures, AMapIsComparedWithOneOfAnotherKind) {
   Expect(RunShell("cairn diff " + Path("orb.cairn") + " " + Path("kaze.cairn")), 0, "landmarks");
   Expect(RunShell("cairn report " + Path("orb.cairn") + " -o " + Path("orb.html")), 0, "");
-  Expect(RunShell("cairn migrate " + Path("orb.cairn") + " -o " + Path("moved.cairn")), 0, "as version 3.7");
+  Expect(RunShell("cairn migrate " + Path("orb.cairn") + " -o " + Path("moved.cairn")), 0, "as version 3.8");
   EXPECT_EQ(Inspect("moved")["descriptors"], "binary 256 orb");
 }
 
