@@ -63,13 +63,13 @@ Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossi
       fmt::format("dividing {} walls by about {:.0f} view boundaries into about {:.0f} regions",
                   plan.num_walls(), num_boundaries, 0.5 * num_edges);
   const char* remedy =
-      "; or simplify the plan (--simplify-m, --snap-m, no furniture), or divide it by buildings and floors";
+      "simplify the plan (--simplify-m, --snap-m, no furniture), or divide it by buildings and floors";
+  // No machine is large enough.
+  if (num_edges > std::numeric_limits<int32_t>::max())
+    return MakeError(ErrorCode::kUnsupported, "{}: more than 32 bits can number; {}", work, remedy);
   const double num_bytes = num_boundaries * kBytesPerBoundary + num_edges * kBytesPerEdge;
   const Status fits = CheckMemory(work, static_cast<int64_t>(num_bytes), memory_mib);
-  if (!fits.ok()) return MakeError(fits.error().code, "{}{}", fits.error().message, remedy);
-  if (num_edges > std::numeric_limits<int32_t>::max())
-    return MakeError(ErrorCode::kUnsupported, "{}: more than 32 bits can number{}", work, remedy);
-  return Ok();
+  return fits.ok() ? fits : MakeError(fits.error().code, "{}; or {}", fits.error().message, remedy);
 }
 
 // Refuses a large plan that, by a sample of its boundaries, takes much more memory than there is, before the
@@ -78,9 +78,11 @@ Status CheckSample(const FloorPlan& plan, const WallRays& rays, int num_threads,
                    Progress& progress) {
   const auto stride = static_cast<int>(plan.vertices.size() / kNumSampledVertices);
   if (stride < 2) return Ok();
-  CAIRN_ASSIGN_OR_RETURN(
-      const std::vector<ViewBoundary> boundaries,
-      FindViewBoundaries(plan, rays, stride, (memory_mib << 20) / kBytesPerBoundary, num_threads, progress));
+  const int64_t max_num_boundaries = (memory_mib << 20) / kBytesPerBoundary;
+  auto sample = FindViewBoundaries(plan, rays, stride, max_num_boundaries, num_threads, progress);
+  if (!sample.ok() && sample.error().code == ErrorCode::kFailed)
+    return CheckSize(plan, static_cast<double>(stride) * static_cast<double>(max_num_boundaries), 0, 0);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ViewBoundary> boundaries, std::move(sample));
   const size_t step = boundaries.size() / kNumSampledBoundaries + 1;
   std::vector<TaggedSegment> segments;
   for (size_t i = 0; i < boundaries.size(); i += step)

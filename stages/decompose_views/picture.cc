@@ -163,8 +163,10 @@ class Picture {
   void DrawLegend(const ViewsOverlay& overlay, bool regions) {
     const double x = width_ + 4;
     double y = kMarginPx + 10;
-    svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{} regions, {} walls</text>\n", x, y,
-               views_.num_faces(), views_.plan.num_walls());
+    const std::string num_regions =
+        views_.num_faces() > 0 ? fmt::format("{} regions, ", views_.num_faces()) : "";
+    svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{}{} walls</text>\n", x, y, num_regions,
+               views_.plan.num_walls());
     if (regions) {
       y += 24;
       svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">walls seen from a region:</text>\n", x, y);

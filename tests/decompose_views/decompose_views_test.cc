@@ -369,18 +369,21 @@ TEST(DecomposeViews, AnswersInEveryPartOfItsWorkOnALargerPlan) {
 }
 
 TEST(DecomposeViews, RefusesADensePlanBeforeAllOfItsBoundariesAreFound) {
-  std::string text;
-  Random random(3);
-  for (int i = 0; i < 600; ++i) {
-    const double x = random.Uniform(0, 100), y = random.Uniform(0, 100);
-    text += fmt::format("{},{},{},{}\n", x, y, x + random.Uniform(0.1, 0.5), y + random.Uniform(0.1, 0.5));
+  for (const auto& [num, memory_mib, message] :
+       {std::tuple(280, 64, "regions takes about"), {600, 1024, "more than 32 bits can number"}}) {
+    std::string text;
+    Random random(3);
+    for (int i = 0; i < num; ++i) {
+      const double x = random.Uniform(0, 100), y = random.Uniform(0, 100);
+      text += fmt::format("{},{},{},{}\n", x, y, x + random.Uniform(0.1, 0.5), y + random.Uniform(0.1, 0.5));
+    }
+    StepsProgress progress(1 << 30);
+    const auto result = DecomposeViews(Parsed(text), {}, 1, memory_mib, progress);
+    ASSERT_FALSE(result.ok());
+    EXPECT_THAT(result.error().message, HasSubstr(message));
+    EXPECT_THAT(result.error().message, HasSubstr("--simplify-m"));
+    for (const auto& [task, total] : progress.tasks) EXPECT_NE(task, "view boundaries") << total;
   }
-  StepsProgress progress(1 << 30);
-  const auto result = DecomposeViews(Parsed(text), {}, 1, 1024, progress);
-  ASSERT_FALSE(result.ok());
-  EXPECT_THAT(result.error().message, HasSubstr("regions takes about"));
-  EXPECT_THAT(result.error().message, HasSubstr("--simplify-m"));
-  for (const auto& [task, total] : progress.tasks) EXPECT_NE(task, "view boundaries") << total;
 }
 
 TEST(DecomposeViews, RealPlansHaveTheLabelsThatAreSeen) {
