@@ -30,7 +30,8 @@ OptionTable DescribeOptions(PlanTrackerOptions* o) {
   OptionTable table = {
       {.name = "min_way_m",
        .value = &o->min_way_m,
-       .help = "a scan or an image counts after so much way since the last one that did, m",
+       .help =
+           "a scan or an image counts after so much way since the last one that did, as the crow flies, m",
        .min = 0},
       {.name = "min_turn_deg",
        .value = &o->min_turn_deg,
@@ -58,15 +59,15 @@ Status PlanTracker::Move(const FloorMotion& motion) {
     return MakeError(ErrorCode::kInvalidArgument, "a motion that is not finite");
   belief_.Move({{motion.way_m, motion.turn_left_rad}, WheelCovariance(motion, options_.wheels)});
   for (SinceLook* since : {&since_scan_, &since_image_}) {
-    since->way_m += motion.way_m.norm();
-    since->turn_rad += std::abs(motion.turn_left_rad);
+    since->now = {since->now.FloorFromRobot(motion.way_m),
+                  WrapAngle(since->now.heading_rad + motion.turn_left_rad)};
   }
   return Ok();
 }
 
 bool PlanTracker::IsNew(const SinceLook& since) const {
-  return !since.any || since.way_m >= options_.min_way_m ||
-         since.turn_rad >= RadFromDeg(options_.min_turn_deg);
+  return !since.any || since.now.position.norm() >= options_.min_way_m ||
+         std::abs(since.now.heading_rad) >= RadFromDeg(options_.min_turn_deg);
 }
 
 Status PlanTracker::SeeScan(const ScanView& scan) {

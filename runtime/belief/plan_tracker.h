@@ -51,10 +51,10 @@ class PlanTracker {
   const PoseBelief& belief() const { return belief_; }
 
  private:
-  // How far the robot moved since the last look of a sense that counted.
+  // The last look of a sense that counted, and where the robot is since, in its frame there.
   struct SinceLook {
     bool any = false;
-    double way_m = 0, turn_rad = 0;
+    PlanarPose now;
   };
   PlanTracker(ScanLocator locator, double area_m2, const PlanTrackerOptions& options);
   bool IsNew(const SinceLook& since) const;

@@ -96,6 +96,12 @@ TEST(PlanTracker, StandingStillTellsNothingNew) {
     robot.Look();
   }
   EXPECT_NEAR(robot.Believed(), before, 0.02);
+  // Nor does trembling.
+  for (int i = 0; i < 20; ++i) {
+    robot.Drive(0, i % 2 == 0 ? 0.1 : -0.1);
+    robot.Look();
+  }
+  EXPECT_NEAR(robot.Believed(), before, 0.02);
 }
 
 // A turn is told by the scans that do not count, too.
