@@ -75,9 +75,8 @@ Drive DriveFrom(size_t start, const std::vector<RangeScan>& scans, const std::ve
   // The scans between are the map's.
   for (size_t i = start; i < scans.size() && way < kDriveM; i += 2) {
     if (i > start) {
-      const PlanarPose &before = *views[i - 2].odometry, &now = *views[i].odometry;
-      (void)tracker.Move(
-          {before.RobotFromFloor(now.position), WrapAngle(now.heading_rad - before.heading_rad)});
+      const PlanarPose moved = MotionBetween(*views[i - 2].odometry, *views[i].odometry);
+      (void)tracker.Move({moved.position, moved.heading_rad});
       way += (scans[i].pose.position - scans[i - 2].pose.position).norm();
     }
     (void)tracker.SeeScan(views[i]);

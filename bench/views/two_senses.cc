@@ -68,7 +68,8 @@ struct Count {
 
 FloorMotion MotionOf(const PlanarPose& from, const PlanarPose& to, Random* random) {
   const double way = 1 + random->Normal(0, kWheelsErr), turn = 1 + random->Normal(0, kWheelsErr);
-  return {way * from.RobotFromFloor(to.position), turn * WrapAngle(to.heading_rad - from.heading_rad)};
+  const PlanarPose moved = MotionBetween(from, to);
+  return {way * moved.position, turn * moved.heading_rad};
 }
 
 }  // namespace

@@ -24,4 +24,13 @@ struct PlanarPose {
 // The same angle in [-pi, pi].
 inline double WrapAngle(double angle_rad) { return std::remainder(angle_rad, 2 * std::numbers::pi); }
 
+// floor_from_a times a_from_b.
+inline PlanarPose operator*(const PlanarPose& a, const PlanarPose& b) {
+  return {a.FloorFromRobot(b.position), WrapAngle(a.heading_rad + b.heading_rad)};
+}
+// How a robot moved from one pose to another, in its frame at the first: from * MotionBetween(from, to) = to.
+inline PlanarPose MotionBetween(const PlanarPose& from, const PlanarPose& to) {
+  return {from.RobotFromFloor(to.position), WrapAngle(to.heading_rad - from.heading_rad)};
+}
+
 }  // namespace cairn

@@ -39,4 +39,17 @@ CellGrid GridAround(const std::vector<PlanWall>& walls, double margin_m, double 
   return grid;
 }
 
+WallsByCell::WallsByCell(const CellGrid& grid, const std::vector<PlanWall>& walls, double reach)
+    : offsets_(grid.size() + 1, 0) {
+  for (const PlanWall& wall : walls)
+    ForCellsNear(grid, wall, reach, [&](int column, int row) { ++offsets_[grid.Index(column, row) + 1]; });
+  for (size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
+  walls_.resize(offsets_.back());
+  std::vector<int64_t> next(offsets_.begin(), offsets_.end() - 1);
+  for (int32_t i = 0; i < std::ssize(walls); ++i) {
+    ForCellsNear(grid, walls[i], reach,
+                 [&](int column, int row) { walls_[next[grid.Index(column, row)]++] = i; });
+  }
+}
+
 }  // namespace cairn

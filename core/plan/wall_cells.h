@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -62,5 +64,22 @@ void ForCellsNear(const CellGrid& grid, const PlanWall& wall, double reach_m, Vi
       visit(column, row);
   }
 }
+
+// The walls that come near to each cell of a grid.
+class WallsByCell {
+ public:
+  WallsByCell() = default;
+  // Those within `reach` of a cell, and some more.
+  WallsByCell(const CellGrid& grid, const std::vector<PlanWall>& walls, double reach);
+
+  // Ascending.
+  std::span<const int32_t> At(size_t cell) const {
+    return std::span(walls_).subspan(offsets_[cell], offsets_[cell + 1] - offsets_[cell]);
+  }
+
+ private:
+  std::vector<int64_t> offsets_;
+  std::vector<int32_t> walls_;  // cell i: walls_[offsets_[i] .. offsets_[i + 1])
+};
 
 }  // namespace cairn

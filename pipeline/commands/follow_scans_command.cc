@@ -132,8 +132,8 @@ Result<FloorMotion> MotionTo(const ScanView& scan, const ScanView& before, const
                      "knows how the robot drove between them are located one by one: cairn plan locate",
                      log);
   }
-  return FloorMotion{before.odometry->RobotFromFloor(scan.odometry->position),
-                     WrapAngle(scan.odometry->heading_rad - before.odometry->heading_rad)};
+  const PlanarPose moved = MotionBetween(*before.odometry, *scan.odometry);
+  return FloorMotion{moved.position, moved.heading_rad};
 }
 
 Status CheckArguments(const FollowArguments& arguments) {

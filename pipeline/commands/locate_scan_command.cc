@@ -14,18 +14,10 @@
 #include "pipeline/commands/open_plan.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/beams/scan_locator.h"
-#include "runtime/map/open_views.h"
 #include "runtime/scans/read_scans.h"
 #include "stages/decompose_views/picture.h"
 
 namespace cairn::pipeline {
-
-Result<std::shared_ptr<const Views>> OpenPlanFor(const std::string& path, const ScanLocatorOptions& options,
-                                                 const CommandEnvironment& environment) {
-  if (options.search != "vir") return OpenPlan(path);
-  return OpenViews(path, environment.num_threads, environment.memory_mib, *environment.progress);
-}
-
 namespace {
 
 using nlohmann::ordered_json;
@@ -44,22 +36,19 @@ struct LocateScanArguments {
 
 // `regions`: null where the plan has none.
 ordered_json HypothesisJson(const ScanHypothesis& found, const FaceLocator* regions) {
-  ordered_json covariance = ordered_json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) covariance.push_back(found.covariance(row, column));
-  }
-  ordered_json json = {{"x", found.pose.position.x()},
-                       {"y", found.pose.position.y()},
-                       {"heading_deg", DegFromRad(found.pose.heading_rad)},
-                       {"probability", found.probability},
-                       {"determined", found.determined},
-                       {"explained", found.explained_ratio},
-                       {"matched", found.num_matched},
-                       {"matched_length_m", found.matched_length_m},
-                       {"hidden_length_m", found.hidden_length_m},
-                       {"rms_m", found.rms_m},
-                       {"labels", found.labels},
-                       {"covariance", covariance}};
+  ordered_json json = {
+      {"x", found.pose.position.x()},
+      {"y", found.pose.position.y()},
+      {"heading_deg", DegFromRad(found.pose.heading_rad)},
+      {"probability", found.probability},
+      {"determined", found.determined},
+      {"explained", found.explained_ratio},
+      {"matched", found.num_matched},
+      {"matched_length_m", found.matched_length_m},
+      {"hidden_length_m", found.hidden_length_m},
+      {"rms_m", found.rms_m},
+      {"labels", found.labels},
+      {"covariance", std::vector<double>(found.covariance.data(), found.covariance.data() + 9)}};
   if (regions != nullptr) json["region"] = regions->Find(found.pose.position);
   return json;
 }

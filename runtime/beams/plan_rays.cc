@@ -35,20 +35,9 @@ void InsertHit(const PlanRays::Hit& hit, PlanRays::Hits* hits) {
 }  // namespace
 
 PlanRays::PlanRays(const std::vector<PlanWall>& walls)
-    : walls_(walls), grid_(GridAround(walls, kRayCellM, kRayCellM, kMaxRayCells)) {
-  offsets_.assign(grid_.size() + 1, 0);
-  for (const PlanWall& wall : walls) {
-    ForCellsNear(grid_, wall, kBorder,
-                 [&](int column, int row) { ++offsets_[grid_.Index(column, row) + 1]; });
-  }
-  for (size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
-  cell_walls_.resize(offsets_.back());
-  std::vector<int64_t> next(offsets_.begin(), offsets_.end() - 1);
-  for (int32_t i = 0; i < std::ssize(walls); ++i) {
-    ForCellsNear(grid_, walls[i], kBorder,
-                 [&](int column, int row) { cell_walls_[next[grid_.Index(column, row)]++] = i; });
-  }
-}
+    : walls_(walls),
+      grid_(GridAround(walls, kRayCellM, kRayCellM, kMaxRayCells)),
+      by_cell_(grid_, walls, kBorder) {}
 
 PlanRays::Hits PlanRays::Cast(const Vec2& origin, const Vec2& direction, double reach_m) const {
   Hits hits;
@@ -81,16 +70,15 @@ PlanRays::Hits PlanRays::Cast(const Vec2& origin, const Vec2& direction, double 
   while (true) {
     const int axis = next[0] < next[1] ? 0 : 1;
     const double end = std::min(next[axis], leave);
-    const size_t index = grid_.Index(cell[0], cell[1]);
-    for (int64_t i = offsets_[index]; i < offsets_[index + 1]; ++i) {
-      const PlanWall& wall = walls_[cell_walls_[i]];
+    for (const int32_t wall_idx : by_cell_.At(grid_.Index(cell[0], cell[1]))) {
+      const PlanWall& wall = walls_[wall_idx];
       const Vec2 to_start = wall.start - origin, along = wall.end - wall.start;
       const double side_a = Cross(direction, to_start), side_b = Cross(direction, wall.end - origin);
       if ((side_a > 0) == (side_b > 0)) continue;
       const double distance = Cross(to_start, along) / Cross(direction, along);
       // Beyond the cell it is found in its own, nearer ones first.
       if (distance > 0 && distance <= end + kBorder && distance <= reach_m)
-        InsertHit({distance, cell_walls_[i]}, &hits);
+        InsertHit({distance, wall_idx}, &hits);
     }
     if (hits.size == kMaxHits || end >= leave) return hits;
     next[axis] += step[axis];

@@ -38,8 +38,7 @@ class PlanRays {
  private:
   const std::vector<PlanWall>& walls_;
   const CellGrid grid_;
-  std::vector<int64_t> offsets_;
-  std::vector<int32_t> cell_walls_;  // cell i: cell_walls_[offsets_[i] .. offsets_[i + 1])
+  const WallsByCell by_cell_;
 };
 
 }  // namespace cairn

@@ -118,6 +118,7 @@ struct PoseGroup {
   WeighedPose best;
   Vec2 along = Vec2::Zero();
   double low_m = 0, high_m = 0;  // of the row, from the best along it
+  bool is_expected = false;      // any of them
 };
 
 struct PoseGroups {
@@ -139,7 +140,7 @@ PoseGroups GroupPoses(const std::vector<WeighedPose>& poses, double weight, size
       found.complete = false;
       continue;
     }
-    PoseGroup group{poses[i]};
+    PoseGroup group{.best = poses[i], .is_expected = poses[i].is_expected};
     const auto [along, sigma] = LeastKnown(covariance_of(poses[i]));
     if (sigma > kKnownM) {
       group.along = along;
@@ -162,11 +163,11 @@ PoseGroups GroupPoses(const std::vector<WeighedPose>& poses, double weight, size
       group.high_m = last->first;
       for (auto member = first; member <= last; ++member) {
         taken[member->second] = 1;
-        group.best.is_expected = group.best.is_expected || poses[member->second].is_expected;
+        group.is_expected = group.is_expected || poses[member->second].is_expected;
       }
     }
     taken[i] = 1;
-    num_others += group.best.is_expected ? 0 : 1;
+    num_others += group.is_expected ? 0 : 1;
     found.groups.push_back(group);
   }
   return found;
@@ -357,9 +358,7 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
     PlanarPose refined = group.best.pose;
     for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
     const WeighedPose before = Weighed(scan.beams, group.best.pose), after = Weighed(scan.beams, refined);
-    const bool is_expected = group.best.is_expected;
     group.best = after.evidence.log_likelihood > before.evidence.log_likelihood ? after : before;
-    group.best.is_expected = is_expected;
   }
   std::stable_sort(groups.begin(), groups.end(), [](const PoseGroup& a, const PoseGroup& b) {
     return a.best.evidence.log_likelihood > b.best.evidence.log_likelihood;
@@ -372,14 +371,14 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
     if (better == apart.end()) {
       apart.push_back(group);
     } else {
-      better->best.is_expected = better->best.is_expected || group.best.is_expected;
+      better->is_expected = better->is_expected || group.is_expected;
     }
   }
   for (const PoseGroup& group : apart) {
     ScanHypothesis found;
     found.pose = group.best.pose;
     found.explained_ratio = group.best.evidence.explained_ratio;
-    found.is_expected = group.best.is_expected;
+    found.is_expected = group.is_expected;
     found.probability =
         std::exp(weight * (group.best.evidence.log_likelihood - groups.front().best.evidence.log_likelihood));
     found.covariance = covariance_of(group.best);

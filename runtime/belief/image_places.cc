@@ -32,8 +32,7 @@ UncertainPlanarPose CameraOnPlan(const Pose& cam_from_world, const Matrix6d& cov
 // A robot that carries the camera.
 UncertainPlanarPose RobotOf(const UncertainPlanarPose& camera, const PlanarPose& robot_in_camera) {
   UncertainPlanarPose robot;
-  robot.pose = {camera.pose.FloorFromRobot(robot_in_camera.position),
-                WrapAngle(camera.pose.heading_rad + robot_in_camera.heading_rad)};
+  robot.pose = camera.pose * robot_in_camera;
   const Eigen::Vector2d arm = robot.pose.position - camera.pose.position;
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity();
   jacobian.topRightCorner<2, 1>() = Eigen::Vector2d(-arm.y(), arm.x());

@@ -57,11 +57,9 @@ Result<PlanTracker> PlanTracker::Make(const Views& views, const PlanTrackerOptio
 Status PlanTracker::Move(const FloorMotion& motion) {
   if (!motion.way_m.allFinite() || !std::isfinite(motion.turn_left_rad))
     return MakeError(ErrorCode::kInvalidArgument, "a motion that is not finite");
-  belief_.Move({{motion.way_m, motion.turn_left_rad}, WheelCovariance(motion, options_.wheels)});
-  for (SinceLook* since : {&since_scan_, &since_image_}) {
-    since->now = {since->now.FloorFromRobot(motion.way_m),
-                  WrapAngle(since->now.heading_rad + motion.turn_left_rad)};
-  }
+  const PlanarPose step{motion.way_m, motion.turn_left_rad};
+  belief_.Move({step, WheelCovariance(motion, options_.wheels)});
+  for (SinceLook* since : {&since_scan_, &since_image_}) since->now = since->now * step;
   return Ok();
 }
 

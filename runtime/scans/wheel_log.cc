@@ -3,22 +3,12 @@
 #include <algorithm>
 
 namespace cairn {
-namespace {
-
-// A pose moved as from one to another.
-PlanarPose Moved(const PlanarPose& pose, const PlanarPose& from, const PlanarPose& to) {
-  return {pose.FloorFromRobot(from.RobotFromFloor(to.position)),
-          WrapAngle(pose.heading_rad + to.heading_rad - from.heading_rad)};
-}
-
-}  // namespace
-
 void WheelLog::AddOdometry(const PlanarPose& wheels, std::optional<double> time_s) {
   const bool is_correction = has_time_ && time_s == 0;
   PlanarPose now = wheels;
   if (!messages_.empty()) {
     const PlanarPose& last = messages_.back().wheels;
-    now = is_correction ? last : Moved(last, last_told_, wheels);
+    now = is_correction ? last : last * MotionBetween(last_told_, wheels);
   }
   last_told_ = wheels;
   const double before_s = messages_.empty() ? 0 : messages_.back().time_s;

@@ -140,9 +140,7 @@ PlanarPose Robot::Axle() const {
   return axle;
 }
 
-void Robot::PutAxleAt(const PlanarPose& axle) {
-  pose_ = {axle.FloorFromRobot(Mounting().position), WrapAngle(axle.heading_rad + Mounting().heading_rad)};
-}
+void Robot::PutAxleAt(const PlanarPose& axle) { pose_ = axle * Mounting(); }
 
 // False where a wall stops it.
 bool Robot::Move(const ServoCommand& command) {

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "core/base/progress.h"
@@ -37,24 +38,20 @@ class WallsNear {
     std::vector<PlanWall> lines;
     for (const Wall& wall : walls) lines.push_back({Real(wall.start), Real(wall.end)});
     grid_ = GridAround(lines, reach, 2 * reach, std::max<double>(kLeastNumCells, 2.0 * lines.size()));
-    cells_.resize(grid_.size());
-    for (int32_t i = 0; i < std::ssize(lines); ++i) {
-      ForCellsNear(grid_, lines[i], reach,
-                   [&](int column, int row) { cells_[grid_.Index(column, row)].push_back(i); });
-    }
+    by_cell_ = WallsByCell(grid_, lines, reach);
   }
 
   // Ascending.  REQUIRES: an end that one of the walls had when this was made
-  const std::vector<int32_t>& At(const GridPoint& place) const {
+  std::span<const int32_t> At(const GridPoint& place) const {
     const Eigen::Vector2i cell = grid_.CellOf(Real(place));
-    return cells_[grid_.Index(cell.x(), cell.y())];
+    return by_cell_.At(grid_.Index(cell.x(), cell.y()));
   }
 
  private:
   static constexpr double kLeastNumCells = 1024;
 
   CellGrid grid_;
-  std::vector<std::vector<int32_t>> cells_;
+  WallsByCell by_cell_;
 };
 
 // Cleans a plan; keeps its frame and the list of changes.
