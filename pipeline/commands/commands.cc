@@ -40,7 +40,7 @@ Command StageFamily() {
 Command PlanFamily() {
   return Family("plan", "Floor plans and laser scans: where a scan was taken, paths, look-alike places",
                 {decompose_views::DecomposeViewsCommand(), LocateScanCommand(), FollowScansCommand(),
-                 PlanPathCommand(), TellApartCommand()});
+                 PlanPathCommand(), TellApartCommand(), NextLookCommand()});
 }
 
 Command UpdateFamily() {

@@ -51,6 +51,8 @@ Command FollowScansCommand();
 Command PlanPathCommand();
 // cairn plan tell-apart VIEWS --a X,Y,DEG --b X,Y,DEG [--svg FILE]
 Command TellApartCommand();
+// cairn plan next-look PLAN PLACES [--scan N] [--camera] [--svg FILE]
+Command NextLookCommand();
 // cairn route: a route from one survey image to another over the map's kept images
 Command RouteCommand();
 // cairn drive: a lost robot goes to a survey image in a simulated building

@@ -142,14 +142,15 @@ std::string Drawn(const Views& views, const PlanarPose& a, const PlanarPose& b,
 
 Status RunApart(const ApartArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(
-      const std::shared_ptr<const Views> opened,
-      OpenViews(arguments.views, environment.num_threads, environment.memory_mib, *environment.progress));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenPlan(arguments.views));
   const Views& views = *opened;
-  const PlanSpace space(views);
   CAIRN_ASSIGN_OR_RETURN(const PlanarPose a, ParsePose("--a", arguments.a));
   CAIRN_ASSIGN_OR_RETURN(const PlanarPose b, ParsePose("--b", arguments.b));
-  CAIRN_ASSIGN_OR_RETURN(const DisambiguationPlan plan, PlanDisambiguation(space, a, b, arguments.options));
+  CAIRN_ASSIGN_OR_RETURN(
+      const DisambiguationPlan plan,
+      views.num_faces() > 0 ? PlanDisambiguation(PlanSpace(views), a, b, arguments.options)
+                            : PlanDisambiguation(views.plan, a, b, arguments.options, environment.num_threads,
+                                                 environment.memory_mib, *environment.progress));
   ordered_json line = {
       {"outcome", OutcomeName(plan.outcome)}, {"case", plan.kind}, {"regions", plan.num_regions}};
   if (plan.kind > 0) {

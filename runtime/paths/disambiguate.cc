@@ -1,17 +1,23 @@
 #include "runtime/paths/disambiguate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <queue>
 #include <tuple>
 #include <unordered_set>
 
 #include "core/geometry/pose.h"
+#include "core/view_regions/derive_views.h"
+#include "core/view_regions/nearby_plan.h"
 
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
+
+// Regions are first derived within so many ranges of the laser.
+constexpr double kFirstReach = 1.5;
 
 // A stretch of wall in the robot's frame that only one of two views has.
 struct Feature {
@@ -269,6 +275,34 @@ Result<DisambiguationPlan> PlanDisambiguation(const PlanSpace& space, const Plan
     }
   }
   return Planner(space, a, b, options).Run();
+}
+
+Result<DisambiguationPlan> PlanDisambiguation(const FloorPlan& plan, const PlanarPose& a, const PlanarPose& b,
+                                              const DisambiguateOptions& options, int num_threads,
+                                              int64_t memory_mib, Progress& progress) {
+  DisambiguateOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  const std::array<Vec2, 2> places = {a.position, b.position};
+  for (const Vec2& place : places) {
+    if (place.allFinite() && plan.Contains(place)) continue;
+    return MakeError(ErrorCode::kInvalidArgument, "the place ({:g}, {:g}) lies in no region of the plan",
+                     place.x(), place.y());
+  }
+  for (double reach_m = kFirstReach * options.max_range_m;; reach_m *= 2) {
+    const NearbyPlan near = PlanNear(plan, places, reach_m);
+    if (near.walls.size() == plan.walls.size()) break;
+    if (near.walls.empty()) continue;
+    CAIRN_ASSIGN_OR_RETURN(const DerivedViews derived,
+                           DeriveViews(near.plan, num_threads, memory_mib, progress));
+    const auto found = PlanDisambiguation(PlanSpace(derived.views), a, b, options);
+    if (!found.ok()) return found;
+    // The search went no farther than this.
+    if (found->outcome == DisambiguationOutcome::kFound && found->is_best &&
+        found->path_length_m + options.cost_of_distance * found->distance_m + options.max_range_m <= reach_m)
+      return found;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const DerivedViews derived, DeriveViews(plan, num_threads, memory_mib, progress));
+  return PlanDisambiguation(PlanSpace(derived.views), a, b, options);
 }
 
 }  // namespace cairn

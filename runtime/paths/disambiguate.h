@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/progress.h"
 #include "core/geometry/planar_pose.h"
 #include "core/options/options.h"
 #include "runtime/paths/plan_space.h"
@@ -64,5 +65,12 @@ struct DisambiguationPlan {
 // robot cannot move because it does not fit at a pose).
 Result<DisambiguationPlan> PlanDisambiguation(const PlanSpace& space, const PlanarPose& a,
                                               const PlanarPose& b, const DisambiguateOptions& options);
+
+// The same in a plan without regions: they are derived (core/view_regions/derive_views.h) from the walls near
+// to the two poses, and from more of them until the motion and all that is seen along it lie among them.
+// Errors: those of DeriveViews, too.
+Result<DisambiguationPlan> PlanDisambiguation(const FloorPlan& plan, const PlanarPose& a, const PlanarPose& b,
+                                              const DisambiguateOptions& options, int num_threads,
+                                              int64_t memory_mib, Progress& progress);
 
 }  // namespace cairn

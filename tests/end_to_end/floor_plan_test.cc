@@ -146,6 +146,47 @@ TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
   EXPECT_THAT(*ReadFile(Path("apart.svg")), HasSubstr("gave up after 2 regions"));
 }
 
+// Two rooms alike but for a niche around the corner: what locate prints is told apart by where to look next.
+TEST_F(FloorPlan, PlacesThatLocatePrintsAreToldApart) {
+  const std::string left = "0,0,0,5\n0,5,4,5\n4,5,4,4\n4,4,1,4\n1,4,1,0\n1,0,0,0\n";
+  const std::string right =
+      "10,0,10,5\n10,5,14,5\n14,5,14,4\n14,4,11,4\n11,4,11,0\n11,0,10,0\n13,4.1,13,4.9\n";
+  ASSERT_TRUE(WriteFileAtomically(Path("elbows.txt"), left + right).ok());
+  ASSERT_EQ(Run("plan decompose elbows.txt -o elbows.db").exit_code, 0);
+  std::vector<PlanWall> walls;
+  std::istringstream lines(left);
+  for (std::string line; std::getline(lines, line);) {
+    PlanWall wall;
+    std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf", &wall.start.x(), &wall.start.y(), &wall.end.x(),
+                &wall.end.y());
+    walls.push_back(wall);
+  }
+  ASSERT_TRUE(WriteFileAtomically(Path("one.log"), LoggedScan(walls, {{0.5, 0.6}, 1.57})).ok());
+  const ProgramRun located = Run("plan locate elbows.db one.log");
+  ASSERT_EQ(located.exit_code, 0) << located.err;
+  ASSERT_GE(json::parse(located.out)["solutions"].size(), 2u) << located.out;
+  ASSERT_TRUE(WriteFileAtomically(Path("places.json"), located.out).ok());
+  const ProgramRun next = Run("plan next-look elbows.db places.json --radius-m 0.1 --svg next.svg");
+  ASSERT_EQ(next.exit_code, 0) << next.err;
+  const json look = json::parse(next.out);
+  EXPECT_EQ(look["outcome"], "found");
+  EXPECT_GE(look["places"].size(), 2u);
+  EXPECT_EQ(look["places"][0]["path"].size(), look["path"].size());
+  EXPECT_GE(look["expected_length_m"].get<double>(), 0);
+  EXPECT_THAT(*ReadFile(Path("next.svg")), HasSubstr("on average"));
+  EXPECT_EQ(next.out, Run("plan next-look elbows.db places.json --radius-m 0.1 --threads 1").out);
+  // The last line counts, or that of a scan; lines of follow are as good.
+  const std::string one =
+      R"({"scan": 7, "places": [{"x": 0.5, "y": 0.5, "heading_deg": 90, "probability": 1}]})";
+  ASSERT_TRUE(WriteFileAtomically(Path("both.json"), located.out + one + "\n").ok());
+  EXPECT_EQ(json::parse(Run("plan next-look elbows.db both.json").out)["outcome"], "one_place");
+  EXPECT_EQ(json::parse(Run("plan next-look elbows.db both.json --scan 7").out)["outcome"], "one_place");
+  EXPECT_EQ(json::parse(Run("plan next-look elbows.db both.json --scan 0 --radius-m 0.1").out), look);
+  const ProgramRun reach = Run("plan next-look elbows.db places.json --radius-m 0.1 --reach-m 0.6");
+  EXPECT_EQ(reach.exit_code, 1);
+  EXPECT_THAT(reach.err, HasSubstr("--reach-m"));
+}
+
 TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   ASSERT_EQ(Run("plan decompose plan.txt -o views.db").exit_code, 0);
   const auto write = [&](const char* name, const std::string& text) {
@@ -161,6 +202,13 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   const std::string scan_json =
       R"({"angle_min": 0, "angle_increment": 1, "range_max": 9, "ranges": [1, 1, 1, 1]})";
   write("bare.json", scan_json + "\n" + scan_json + "\n");
+  const std::string place = R"({"x": 1, "y": 1, "heading_deg": 0, "probability": 0.5})";
+  write("place.json", "{\"scan\": 3, \"places\": [" + place + "]}\n");
+  write("lame.json",
+        "{\"places\": [" + place + R"(, {"x": 1, "y": null, "heading_deg": 0, "probability": 1}]})");
+  write("wide.json",
+        R"({"places": [{"x": 1, "y": 1, "heading_deg": 0, "probability": 1, "covariance": [1, 2]}]})");
+  write("away.json", R"({"places": [{"x": 99, "y": 1, "heading_deg": 0, "probability": 1}]})");
   write("cut.log", "ODOM 1\nFLASER 4 1 1 1 1 1 1 0 1 1 0 1 h 1\n");
   write("scan.txt", "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n");
   write(
@@ -211,6 +259,17 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},
            Case{"plan tell-apart views.db --a 1,2,0 --b 5,2,0 --max-num-regions 0", 2, "max_num_regions"},
            Case{"plan tell-apart twins.db --a 1,1,0 --b 11,1,0 --max-num-regions 2", 1, "gave up"},
+           Case{"plan next-look views.db scan.txt", 2, "scan.txt:1: no JSON object"},
+           Case{"plan next-look views.db empty.txt", 2, "empty.txt: no line"},
+           Case{"plan next-look views.db none.json", 3, "none.json"},
+           Case{"plan next-look views.db bare.json", 2, "bare.json:2: no list of"},
+           Case{"plan next-look views.db place.json --scan 4", 2, "place.json: no line of scan 4"},
+           Case{"plan next-look views.db lame.json", 2, "places[1] lacks one of the numbers"},
+           Case{"plan next-look views.db wide.json", 2, "places[0]: its covariance has not 9 numbers"},
+           Case{"plan next-look views.db place.json --camera", 14, "--camera needs a map"},
+           Case{"plan next-look views.db place.json --laser-in-camera 1,0,0", 2, "say so with --camera"},
+           Case{"plan next-look views.db place.json --reach-m nan", 2, "reach_m"},
+           Case{"plan next-look views.db away.json", 6, "outside of the plan"},
            Case{"plan path views.db --from 1,1 --to 50,1", 2, "no region"},
        }) {
     const ProgramRun run = Run(arguments);

@@ -192,5 +192,38 @@ TEST(Disambiguate, WhichPoseIsCalledADoesNotMatter) {
   EXPECT_THAT(num_apart, testing::Each(testing::Gt(3)));
 }
 
+// Two elbows 100 m from two others: regions are derived around the poses alone, and the answer is that of
+// all.
+TEST(Disambiguate, RegionsNearTheTwoPosesAreEnough) {
+  std::string text = kElbows;
+  for (const PlanWall& wall : decompose_views::Decomposed(kElbows).views.plan.walls) {
+    text +=
+        fmt::format("\n{},{},{},{}", wall.start.x() + 100, wall.start.y(), wall.end.x() + 100, wall.end.y());
+  }
+  const Views whole = decompose_views::Decomposed(text).views;
+  const PlanarPose a{{0.5, 0.5}, 1.57}, b{{10.5, 0.5}, 1.57}, far_b{{110.5, 0.5}, 1.57};
+  NoProgress progress;
+  for (const PlanarPose& other : {b, far_b}) {
+    const auto near = PlanDisambiguation(whole.plan, a, other, {.radius_m = 0.1}, 1, 1024, progress);
+    ASSERT_TRUE(near.ok()) << near.error().message;
+    const auto all = PlanDisambiguation(PlanSpace(whole), a, other, {.radius_m = 0.1});
+    ASSERT_EQ(near->outcome, all->outcome);
+    ASSERT_EQ(near->outcome, DisambiguationOutcome::kFound);
+    // Walls that no laser sees from there do not divide the regions: places are not the same ones.
+    EXPECT_NEAR(near->path_length_m + 0.1 * near->distance_m, all->path_length_m + 0.1 * all->distance_m,
+                0.5);
+    EXPECT_EQ(near->feature_is_at_a, all->feature_is_at_a);
+  }
+  // Nothing tells an elbow from its copy: all regions were looked from.
+  const auto alike =
+      PlanDisambiguation(whole.plan, a, {{100.5, 0.5}, 1.57}, {.radius_m = 0.1}, 1, 1024, progress);
+  ASSERT_TRUE(alike.ok());
+  EXPECT_EQ(alike->outcome, DisambiguationOutcome::kAlike);
+  for (const double x : {-50.0, std::nan("")}) {
+    EXPECT_EQ(PlanDisambiguation(whole.plan, a, {{x, 0.5}, 0}, {}, 1, 1024, progress).error().code,
+              ErrorCode::kInvalidArgument);
+  }
+}
+
 }  // namespace
 }  // namespace cairn
