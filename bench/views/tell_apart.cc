@@ -1,4 +1,4 @@
-// views_tell_apart [--seed N] [--num N] PLAN... | hotel...: robots that a turn about leaves in two places or
+// views_tell_apart [--seed N] [--num N] PLAN|hotelN...: robots that a turn about leaves in two places or
 // more drive until one is sure: by the next look that n poses ask for (runtime/paths/next_look.h), by the
 // planner for the two most probable poses (runtime/paths/disambiguate.h), and at random.  Each robot scans
 // every half metre; its laser sees half the view around, as far as 5 m.
@@ -186,6 +186,35 @@ std::array<double, 2> RatioInterval(const std::vector<double>& above, const std:
   return {ratios[50], ratios[1949]};
 }
 
+using Drives = std::array<std::vector<Drive>, kPlanners.size()>;  // by planner, of the same robots
+
+void PrintDrives(const Drives& drives) {
+  std::array<std::vector<double>, kPlanners.size()> ways;
+  for (size_t planner = 0; planner < kPlanners.size(); ++planner) {
+    for (const Drive& drive : drives[planner]) ways[planner].push_back(drive.way);
+  }
+  for (size_t planner = 0; planner < kPlanners.size(); ++planner) {
+    int right = 0, wrong = 0, unsure = 0, plans = 0, without = 0;
+    double sum = 0, seconds = 0;
+    for (const Drive& drive : drives[planner]) {
+      right += drive.is_right ? 1 : 0;
+      wrong += drive.is_sure && !drive.is_right ? 1 : 0;
+      unsure += drive.is_sure ? 0 : 1;
+      plans += drive.num_plans;
+      without += drive.num_without;
+      sum += drive.way;
+      seconds += drive.seconds;
+    }
+    std::vector<double> sorted = ways[planner];
+    std::sort(sorted.begin(), sorted.end());
+    const auto [low_ratio, high_ratio] = RatioInterval(ways[planner], ways[1]);
+    std::printf("| | %s | %d, %d, %d | %.1f, %.1f | %.2f to %.2f | %d, %d | %.0f |\n", kPlanners[planner],
+                right, wrong, unsure, sorted.empty() ? 0 : sum / static_cast<double>(sorted.size()),
+                sorted.empty() ? 0 : sorted[sorted.size() / 2], low_ratio, high_ratio, plans, without,
+                plans == 0 ? 0 : 1e3 * seconds / plans);
+  }
+}
+
 // A corridor with rooms of one kind on both sides; in one of four stands a pillar.
 std::string Hotel(uint64_t seed) {
   Random random(seed);
@@ -228,12 +257,14 @@ int main(int argc, char** argv) {
   std::printf(
       "| plan | planner | sure and right, sure and wrong, not sure after %.0f m | metres: mean, median | of "
       "those "
-      "at random (95 %%) | plans, without a look | ms a plan |\n|---|---|---|---|---|---|---|\n",
+      "by two poses (95 %%) | plans, without a look | ms a plan |\n|---|---|---|---|---|---|---|\n",
       kMostM);
+  Drives all;
   for (const std::string& path : paths) {
     NoProgress progress;
-    const auto input =
-        path == "hotel" ? decompose_views::ParsePlan(Hotel(seed), path) : decompose_views::ReadPlan(path);
+    const auto input = path.starts_with("hotel")
+                           ? decompose_views::ParsePlan(Hotel(std::strtoull(&path[5], nullptr, 10)), path)
+                           : decompose_views::ReadPlan(path);
     const auto cleaned = input.ok() ? decompose_views::CleanPlan(*input, {}, progress) : input.error();
     if (!cleaned.ok()) {
       std::fprintf(stderr, "%s\n", cleaned.error().message.c_str());
@@ -276,38 +307,19 @@ int main(int argc, char** argv) {
     }
     std::printf("| %s | %zu of %d scans left several places | | | | | |\n", path.c_str(), robots.size(),
                 num_tried);
-    std::array<std::vector<Drive>, kPlanners.size()> drives;
+    Drives drives;
     for (auto& of_planner : drives) of_planner.resize(robots.size());
     ParallelFor(std::ssize(robots) * std::ssize(kPlanners), 0, [&](int64_t i) {
       const auto planner = static_cast<int>(i % std::ssize(kPlanners));
       const size_t robot = i / kPlanners.size();
       drives[planner][robot] = DriveUntilSure(space, robots[robot], planner);
     });
-    std::array<std::vector<double>, kPlanners.size()> ways;
-    for (size_t planner = 0; planner < kPlanners.size(); ++planner) {
-      for (const Drive& drive : drives[planner]) ways[planner].push_back(drive.way);
-    }
-    for (size_t planner = 0; planner < kPlanners.size(); ++planner) {
-      int right = 0, wrong = 0, unsure = 0, plans = 0, without = 0;
-      double sum = 0, seconds = 0;
-      for (const Drive& drive : drives[planner]) {
-        right += drive.is_right ? 1 : 0;
-        wrong += drive.is_sure && !drive.is_right ? 1 : 0;
-        unsure += drive.is_sure ? 0 : 1;
-        plans += drive.num_plans;
-        without += drive.num_without;
-        sum += drive.way;
-        seconds += drive.seconds;
-      }
-      std::vector<double> sorted = ways[planner];
-      std::sort(sorted.begin(), sorted.end());
-      const auto [low_ratio, high_ratio] = RatioInterval(ways[planner], ways.back());
-      std::printf("| | %s | %d, %d, %d | %.1f, %.1f | %.2f to %.2f | %d, %d | %.0f |\n", kPlanners[planner],
-                  right, wrong, unsure, sorted.empty() ? 0 : sum / static_cast<double>(sorted.size()),
-                  sorted.empty() ? 0 : sorted[sorted.size() / 2], low_ratio, high_ratio, plans, without,
-                  plans == 0 ? 0 : 1e3 * seconds / plans);
-    }
+    PrintDrives(drives);
+    for (size_t planner = 0; planner < kPlanners.size(); ++planner)
+      all[planner].insert(all[planner].end(), drives[planner].begin(), drives[planner].end());
     std::fflush(stdout);
   }
+  std::printf("| all | %zu | | | | | |\n", all[0].size());
+  PrintDrives(all);
   return 0;
 }

@@ -24,15 +24,13 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// Of what is expected of a laser that sees all around; it turns to see it.
-constexpr int kNumBeams = 180;
-// A sector's beams that measure something else speak so much against a pose: the logarithm of odds. Beams of
-// one sector count once (ScanLocator).
-constexpr int kNumSectors = 30;
-constexpr double kBySector = 4;
+// Of a laser, all around; and that a robot may look along.
+constexpr int kNumBeams = 192, kNumHeadings = 8;
+// What all beams of a sector of 12 degrees speak against a pose that would measure something else there, the
+// logarithm of odds: they count as one (ScanLocator).
+constexpr double kBySector = 4, kByBeam = kBySector * 30 / kNumBeams;
 // An image of another place speaks so much against a pose; and a look rules a pose out that speaks as much.
-constexpr double kByImage = 4, kRulesOut = 4;
-constexpr int kNumHeadings = 8;
+constexpr double kByImage = 4, kRulesOut = 2;
 // A robot that stands nearer to a wall than it is wide keeps this share of its distance.
 constexpr double kOfClearance = 0.9;
 // Looks from which the second one is planned: the best by what they leave, of all ways to them.
@@ -46,7 +44,6 @@ constexpr int kMaxInSet = 64;
 
 Set Of(int hypothesis) { return Set{1} << hypothesis; }
 bool Has(Set set, int hypothesis) { return (set >> hypothesis & 1) != 0; }
-bool IsSingle(Set set) { return (set & (set - 1)) == 0; }
 
 // A place that the robot may get to, in its frame before it moves.
 struct Place {
@@ -185,57 +182,68 @@ class LookPlanner {
            range > std::max({before, at, after}) + options_.same_range_m;
   }
 
-  // What the looks from a place leave: by the laser all around, which is turned to where most differs, or by
-  // it and the camera, which sees one way.
-  void LookFrom(int place, std::vector<Look>* looks) const {
-    const auto ranges = Ranges(places_[place].at);
-    std::vector<double> against(static_cast<size_t>(num()) * num(), 0);
-    Vec2 towards = Vec2::Zero();
+  // Beams, of both by each other, that do not fit: what tells one from another tells this from that.  Sums of
+  // those before each beam, twice around.
+  using Sums = std::array<int, 2 * kNumBeams + 1>;
+  std::vector<Sums> SumsOf(const std::vector<std::array<double, kNumBeams>>& ranges) const {
+    std::vector<Sums> sums(static_cast<size_t>(num()) * num());
     for (int i = 0; i < num(); ++i) {
-      for (int k = 0; k < num(); ++k) {
-        if (i == k) continue;
-        int num_other = 0;
-        for (int beam = 0; beam < kNumBeams; ++beam) {
-          if (!Differs(ranges[i][beam], ranges[k], beam)) continue;
-          ++num_other;
-          const double angle = 2 * std::numbers::pi * beam / kNumBeams;
-          towards += hypotheses_[i].probability * hypotheses_[k].probability *
-                     Vec2(std::cos(angle), std::sin(angle));
+      for (int k = i + 1; k < num(); ++k) {
+        Sums& of_pair = sums[i * num() + k];
+        of_pair[0] = 0;
+        for (int beam = 0; beam < 2 * kNumBeams; ++beam) {
+          const int at = beam % kNumBeams;
+          of_pair[beam + 1] = of_pair[beam] + (Differs(ranges[i][at], ranges[k], at) ? 1 : 0) +
+                              (Differs(ranges[k][at], ranges[i], at) ? 1 : 0);
         }
-        against[i * num() + k] = kBySector * kNumSectors * num_other / kNumBeams;
+        sums[k * num() + i] = of_pair;
       }
     }
-    Look look{.place = place};
-    // Onto the eighth of a turn: no sum of many small numbers decides the last digit.
-    if (towards.norm() > 1e-6)
-      look.heading_rad = HeadingOf(static_cast<int>(
-          std::lround(std::atan2(towards.y(), towards.x()) / (2 * std::numbers::pi) * kNumHeadings)));
-    const auto add = [&](const std::vector<NodeIdx>& seen) {
+    return sums;
+  }
+
+  // What the looks from a place leave, along each heading; into an empty list.
+  void LookFrom(int place, std::vector<Look>* looks) const {
+    const std::vector<Sums> sums = SumsOf(Ranges(places_[place].at));
+    const int num_seen =
+        std::clamp(static_cast<int>(std::lround(options_.view_deg / 360 * kNumBeams)), 1, kNumBeams);
+    std::vector<int64_t> totals;  // of beams that tell any two apart, those ahead twice, of each look
+    for (int heading = 0; heading < kNumHeadings; ++heading) {
+      Look look{.place = place, .heading_rad = HeadingOf(heading)};
+      const int begin = (heading * kNumBeams / kNumHeadings - num_seen / 2 + kNumBeams) % kNumBeams;
+      std::vector<NodeIdx> images(hypotheses_.size(), -1);
+      for (int i = 0; i < num() && images_ != nullptr; ++i) {
+        PlanarPose robot = RobotAt(i, places_[place].at);
+        robot.heading_rad = WrapAngle(robot.heading_rad + look.heading_rad);
+        images[i] = images_->PlaceAt(robot);
+      }
       bool rules_out = false;
+      int64_t total = 0;
       for (int i = 0; i < num(); ++i) {
         look.left[i] = Of(i);
         for (int k = 0; k < num(); ++k) {
           if (i == k) continue;
-          double sum = against[i * num() + k];
-          if (!seen.empty() && seen[i] >= 0 && (seen[k] < 0 || !images_->AreAlike(seen[i], seen[k])))
-            sum += kByImage;
-          if (sum < kRulesOut) look.left[i] |= Of(k);
+          const Sums& of_pair = sums[i * num() + k];
+          const int num_other = of_pair[begin + num_seen] - of_pair[begin];
+          total += num_other + of_pair[begin + num_seen - num_seen / 4] - of_pair[begin + num_seen / 4];
+          double against = 0.5 * kByBeam * num_other;
+          if (images[i] >= 0 && (images[k] < 0 || !images_->AreAlike(images[i], images[k])))
+            against += kByImage;
+          if (against < kRulesOut) look.left[i] |= Of(k);
         }
         rules_out = rules_out || look.left[i] != All();
       }
-      if (rules_out) looks->push_back(look);
-    };
-    add({});
-    if (images_ == nullptr) return;
-    for (int heading = 0; heading < kNumHeadings; ++heading) {
-      look.heading_rad = HeadingOf(heading);
-      std::vector<NodeIdx> seen;
-      for (int i = 0; i < num(); ++i) {
-        PlanarPose robot = RobotAt(i, places_[place].at);
-        robot.heading_rad = WrapAngle(robot.heading_rad + look.heading_rad);
-        seen.push_back(images_->PlaceAt(robot));
+      if (!rules_out) continue;
+      // Of those that leave the same, the one that shows most of what differs.
+      const auto same = std::find_if(looks->begin(), looks->end(),
+                                     [&](const Look& other) { return other.left == look.left; });
+      if (same == looks->end()) {
+        looks->push_back(look);
+        totals.push_back(total);
+      } else if (total > totals[same - looks->begin()]) {
+        totals[same - looks->begin()] = total;
+        same->heading_rad = look.heading_rad;
       }
-      if (std::any_of(seen.begin(), seen.end(), [](NodeIdx node) { return node >= 0; })) add(seen);
     }
   }
 
@@ -260,70 +268,54 @@ class LookPlanner {
     for (int i = 0; i < num(); ++i) sum += Has(set, i) ? hypotheses_[i].probability : 0;
     return sum;
   }
-  // Of a set, whether any look tells two of it apart.
-  bool IsDone(Set set) const {
-    for (int i = 0; i < num(); ++i) {
-      if (Has(set, i) && (separable_[i] & set) != 0) return false;
-    }
-    return true;
-  }
-  // Whether a look leaves of a set nothing that any look tells apart.
-  bool Ends(const Look& look, Set set) const {
-    for (int i = 0; i < num(); ++i) {
-      if (Has(set, i) && (look.left[i] & set & separable_[i]) != 0) return false;
-    }
-    return true;
+  // A way from one place to another, at least: as the crow flies, or by the lengths of the ways to them.
+  double Apart(int place, int other) const {
+    const Place &a = places_[place], &b = places_[other];
+    return std::max((a.at - b.at).norm(), std::abs(a.length - b.length));
   }
 
-  double Apart(int place, int other) const { return (places_[place].at - places_[other].at).norm(); }
+  // Of a set, how likely two of it that are drawn from it are not told apart by a look, though others do.
+  double Confused(Set set, const Look* look) const {
+    double confused = 0;
+    for (int i = 0; i < num(); ++i) {
+      if (Has(set, i))
+        confused += hypotheses_[i].probability *
+                    Weight((look == nullptr ? set : look->left[i] & set) & separable_[i]);
+    }
+    return confused;
+  }
 
-  // By the straight way: the least, from a place on, until a set is told apart as far as it can be, by one
-  // look if there is one that does.
+  // The expected way from a place on until a set is told apart as far as it can be, if the robot goes each
+  // time to the look that tells most apart for its way.
   double ToTheEnd(Set set, int from) {
-    if (IsDone(set)) return 0;
-    const auto [known, is_new] = to_the_end_.try_emplace({set, from}, 0);
-    if (!is_new) return known->second;
-    const auto [ending, is_new_set] = ending_.try_emplace(set);
-    if (is_new_set) {
-      for (size_t i = 0; i < looks_.size(); ++i) {
-        if (Ends(looks_[i], set)) ending->second.push_back(looks_[i].place);
-      }
-    }
-    double least = 2 * options_.reach_m;
-    for (const int place : ending->second) least = std::min(least, Apart(place, from));
-    return known->second = least;
-  }
-
-  // Of a set, from a place on: the expected way with the best second look.
-  double AfterLook(Set set, int from) {
-    if (IsDone(set)) return 0;
-    const auto [known, is_new] = after_look_.try_emplace({set, from}, 0);
-    if (!is_new) return known->second;
-    const double weight = Weight(set);
-    double least = ToTheEnd(set, from);
+    const auto [known, is_new] = to_the_end_.try_emplace({set, from}, 2 * options_.reach_m);
+    if (!is_new) return known->second;  // what is asked for while it is reckoned leads nowhere: much
+    const double confused = Confused(set, nullptr);
+    if (confused <= 0) return known->second = 0;
+    const Look* best = nullptr;
+    double most = 0;
     for (const Look& look : looks_) {
-      double cost = Apart(look.place, from);
-      for (int i = 0; i < num() && cost < least; ++i) {
-        if (Has(set, i))
-          cost += hypotheses_[i].probability / weight * ToTheEnd(look.left[i] & set, look.place);
-      }
-      least = std::min(least, cost);
+      const double least_way = options_.step_m + Apart(look.place, from);
+      if (confused <= most * least_way) continue;
+      const double told = (confused - Confused(set, &look)) / least_way;
+      if (!(told > most * (1 + 1e-9))) continue;
+      most = told;
+      best = &look;
     }
-    return known->second = least;
+    if (best == nullptr) return known->second;
+    double way = Apart(best->place, from);
+    const double weight = Weight(set);
+    for (int i = 0; i < num(); ++i) {
+      if (Has(set, i))
+        way += hypotheses_[i].probability / weight * ToTheEnd(best->left[i] & set, best->place);
+    }
+    return to_the_end_[{set, from}] = way;
   }
 
   double Cost(const Look& look) {
     double cost = places_[look.place].length;
-    for (int i = 0; i < num(); ++i) cost += hypotheses_[i].probability * AfterLook(look.left[i], look.place);
+    for (int i = 0; i < num(); ++i) cost += hypotheses_[i].probability * ToTheEnd(look.left[i], look.place);
     return cost;
-  }
-
-  // What a look leaves besides the right one, on average.
-  double Left(const Look& look) const {
-    double left = 0;
-    for (int i = 0; i < num(); ++i)
-      left += hypotheses_[i].probability * Weight(look.left[i] & ~Of(i) & separable_[i]);
-    return left;
   }
 
   NextLook Choose() {
@@ -345,7 +337,7 @@ class LookPlanner {
     std::vector<std::pair<double, const Look*>> first;
     double least_left = std::numeric_limits<double>::infinity();
     for (const Look& look : looks_) {
-      const double left = Left(look);
+      const double left = Confused(All(), &look);
       if (!(left < least_left - 1e-9)) continue;
       least_left = left;
       first.emplace_back(left, &look);
@@ -395,9 +387,7 @@ class LookPlanner {
   bool has_more_ = false;       // places beyond the reach
   std::vector<Look> looks_;     // that rule anything out, by the length of the way to them
   std::vector<Set> separable_;  // for each hypothesis, those that some look tells from it
-  // Of sets: places of looks after which nothing of them is left to tell apart; and the ways from places on.
-  std::map<Set, std::vector<int>> ending_;
-  std::map<std::pair<Set, int>, double> to_the_end_, after_look_;
+  std::map<std::pair<Set, int>, double> to_the_end_;  // by the set and the place
 };
 
 }  // namespace
@@ -410,6 +400,11 @@ OptionTable DescribeOptions(NextLookOptions* o) {
        .help = "range of the laser, metres",
        .min = 0.1,
        .max = 1e4},
+      {.name = "view_deg",
+       .value = &o->view_deg,
+       .help = "angle that the laser sees, half of it to either side, degrees",
+       .min = 1,
+       .max = 360},
       {.name = "same_range_m",
        .value = &o->same_range_m,
        .help = "ranges that differ by less are the same, metres",

@@ -18,6 +18,8 @@ struct NextLookOptions {
   double radius_m = 0.2;
   // Distance beyond which the laser sees nothing, metres.  REQUIRES: > 0
   double view_range_m = 20;
+  // The angle that it sees, degrees, half of it to either side.  REQUIRES: in (0, 360]
+  double view_deg = 180;
   // Ranges that differ by less than this, metres, are the same.  REQUIRES: > 0
   double same_range_m = 0.3;
   // Looks are planned at places so far from each other, metres.  REQUIRES: > 0
@@ -26,7 +28,7 @@ struct NextLookOptions {
   double reach_m = 40;
   // Hypotheses of less than this are left out, and the most probable are looked at.
   double least_probability = 0.01;
-  int max_num_hypotheses = 20;
+  int max_num_hypotheses = 30;
 };
 OptionTable DescribeOptions(NextLookOptions* options);
 
@@ -62,11 +64,11 @@ struct NextLook {
 // Plans, before the robot moves, the next look that tells n poses apart: of all places that it gets to
 // without touching a wall at any of them, what the laser would measure at each pose is compared with what it
 // would at each other, and so is what the survey's images say that a camera would see.  The look with the
-// least way in all is taken: to it, and from it to those that tell apart what it leaves, by how probable each
-// is; two looks ahead.  (After Dudek, Romanik and Whitesides: Localizing a robot with minimum travel, SIAM J.
-// Comput. 27, 1998, whose strategy goes to the nearest place that rules any hypothesis out; for two poses
-// [Simsarian96 §4.2].)  The robot looks, and asks again with what is left.  Reads the plan's walls only.
-// `images`: null without a camera.  Deterministic.
+// least expected way in all is taken: to it, and on from there, each time to the look that tells most apart
+// for its way.  A place along a corridor is one of several that are told apart.  (After Dudek, Romanik and
+// Whitesides: Localizing a robot with minimum travel, SIAM J. Comput. 27, 1998, whose strategy goes to the
+// nearest place that rules any hypothesis out; for two poses [Simsarian96 §4.2].)  The robot looks, and asks
+// again with what is left.  Reads the plan's walls only. `images`: null without a camera.  Deterministic.
 // Errors: InvalidArgument (options, a hypothesis that is not finite), NoData (no hypothesis is probable
 // enough; a pose outside of the plan's box or on a wall).
 Result<NextLook> PlanNextLook(const PlanSpace& space, std::span<const PossiblePlace> hypotheses,
