@@ -12,6 +12,7 @@
 #include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "runtime/beams/plan_rays.h"
 #include "runtime/beams/scan_locator.h"
 #include "stages/decompose_views/plan/clean_plan.h"
 #include "stages/decompose_views/plan/read_plan.h"

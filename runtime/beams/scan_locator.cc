@@ -14,7 +14,10 @@
 
 #include "core/geometry/pose.h"
 #include "core/geometry/vector_geometry.h"
+#include "runtime/beams/beam_model.h"
+#include "runtime/beams/plan_rays.h"
 #include "runtime/beams/pose_search.h"
+#include "runtime/beams/wall_field.h"
 #include "runtime/laser/found_interpretations.h"
 #include "runtime/laser/rank_interpretations.h"
 
@@ -224,8 +227,9 @@ ScanLocator::ScanLocator(const Views& views, const ScanLocatorOptions& options)
       options_(options),
       rays_(std::make_shared<PlanRays>(views.plan.walls)),
       field_(std::make_shared<WallField>(views.plan.walls)),
-      model_(views.plan.walls, *rays_,
-             {.sigma_wall_m = options.tree.sigma_wall_m, .sigma_wall_deg = options.tree.sigma_wall_deg}) {
+      model_(std::make_shared<BeamModel>(views.plan.walls, *rays_,
+                                         BeamModelOptions{.sigma_wall_m = options.tree.sigma_wall_m,
+                                                          .sigma_wall_deg = options.tree.sigma_wall_deg})) {
   options_.tree.search = options.search == "standard" ? "standard" : "vir";
   options_.tree.first_only = false;
   if (options.search != "beams") index_ = std::make_shared<ViewSearchIndex>(views);
@@ -250,6 +254,10 @@ Result<ScanLocator> ScanLocator::Make(const Views& views, const ScanLocatorOptio
   return ScanLocator(views, options);
 }
 
+WeighedPose ScanLocator::Weighed(const std::vector<Beam>& beams, const PlanarPose& pose) const {
+  return {pose, model_->Weigh(beams, pose)};
+}
+
 std::vector<WeighedPose> ScanLocator::PosesByBeams(const std::vector<BeamEnd>& ends,
                                                    const std::vector<Beam>& few, LocatedScan* located) const {
   const PoseSearchResult found = SearchPoses(*field_, ends, {});
@@ -265,7 +273,7 @@ WeighedPose ScanLocator::BestNear(const PlanarPose& pose, const std::vector<Beam
   // By the walls nearest to ends, or by those that beams meet first: the better, where walls are dense the
   // second, where the pose is far off the first.
   const WeighedPose by_ends = Weighed(few, RefineByEnds(*field_, plan_->walls, ends, pose)),
-                    by_beams = Weighed(few, model_.Refine(few, kRefineSigmas[0], pose));
+                    by_beams = Weighed(few, model_->Refine(few, kRefineSigmas[0], pose));
   return by_ends.evidence.log_likelihood >= by_beams.evidence.log_likelihood ? by_ends : by_beams;
 }
 
@@ -349,14 +357,14 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
   RemoveTheSame(&weighed);
   const double weight = WeightOfABeam(scan.beams);
   const auto covariance_of = [&](const WeighedPose& pose) {
-    return model_.Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
+    return model_->Covariance(scan.beams, pose.evidence.sigma_m, pose.pose);
   };
   const std::vector<Beam> refining = SomeOf(scan.beams, kMaxNumBeamsRefined);
   const PoseGroups grouped = GroupPoses(weighed, WeightOfABeam(few), kNumRefined, covariance_of);
   std::vector<PoseGroup> groups = grouped.groups;
   for (PoseGroup& group : groups) {
     PlanarPose refined = group.best.pose;
-    for (const double sigma_m : kRefineSigmas) refined = model_.Refine(refining, sigma_m, refined);
+    for (const double sigma_m : kRefineSigmas) refined = model_->Refine(refining, sigma_m, refined);
     const WeighedPose before = Weighed(scan.beams, group.best.pose), after = Weighed(scan.beams, refined);
     group.best = after.evidence.log_likelihood > before.evidence.log_likelihood ? after : before;
   }
@@ -390,7 +398,7 @@ Result<LocatedScan> ScanLocator::Locate(const ScanView& scan, std::span<const Pl
       located.hypotheses.begin(), located.hypotheses.end(),
       [](const ScanHypothesis& a, const ScanHypothesis& b) { return a.probability > b.probability; });
   const double evidence =
-      weight * (groups.front().best.evidence.log_likelihood - model_.WeighWithoutWalls(scan.beams));
+      weight * (groups.front().best.evidence.log_likelihood - model_->WeighWithoutWalls(scan.beams));
   double sum = std::exp(kByChance - evidence);
   for (const ScanHypothesis& found : located.hypotheses) sum += found.probability;
   const double least = options_.least_odds * located.hypotheses.front().probability;

@@ -7,13 +7,16 @@
 
 #include "core/base/error.h"
 #include "core/options/options.h"
-#include "runtime/beams/beam_model.h"
-#include "runtime/beams/pose_search.h"
-#include "runtime/beams/wall_field.h"
 #include "runtime/laser/interpretation_tree.h"
 #include "runtime/scans/read_scans.h"
 
 namespace cairn {
+
+class BeamModel;     // runtime/beams/beam_model.h
+class PlanRays;      // runtime/beams/plan_rays.h
+class WallField;     // runtime/beams/wall_field.h
+struct BeamEnd;      // runtime/beams/pose_search.h
+struct WeighedPose;  // runtime/beams/beam_model.h
 
 struct ScanLocatorOptions {
   // Where poses come from that are then judged by all beams: "beams", from the places and headings at which
@@ -73,9 +76,7 @@ class ScanLocator {
 
  private:
   ScanLocator(const Views& views, const ScanLocatorOptions& options);
-  WeighedPose Weighed(const std::vector<Beam>& beams, const PlanarPose& pose) const {
-    return {pose, model_.Weigh(beams, pose)};
-  }
+  WeighedPose Weighed(const std::vector<Beam>& beams, const PlanarPose& pose) const;
   Result<LocatedScan> Locate(const ScanView& scan, std::span<const PlanarPose> expected, bool searches) const;
   // Where poses come from; weighed by a `few` of the beams.
   std::vector<WeighedPose> PosesByBeams(const std::vector<BeamEnd>& ends, const std::vector<Beam>& few,
@@ -92,7 +93,7 @@ class ScanLocator {
   std::shared_ptr<const PlanRays> rays_;
   std::shared_ptr<const WallField> field_;
   std::shared_ptr<const ViewSearchIndex> index_;  // for searches by segments
-  BeamModel model_;
+  std::shared_ptr<const BeamModel> model_;
 };
 
 }  // namespace cairn

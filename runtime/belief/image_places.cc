@@ -29,17 +29,6 @@ UncertainPlanarPose CameraOnPlan(const Pose& cam_from_world, const Matrix6d& cov
   return camera;
 }
 
-// A robot that carries the camera.
-UncertainPlanarPose RobotOf(const UncertainPlanarPose& camera, const PlanarPose& robot_in_camera) {
-  UncertainPlanarPose robot;
-  robot.pose = camera.pose * robot_in_camera;
-  const Eigen::Vector2d arm = robot.pose.position - camera.pose.position;
-  Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity();
-  jacobian.topRightCorner<2, 1>() = Eigen::Vector2d(-arm.y(), arm.x());
-  robot.covariance = jacobian * camera.covariance * jacobian.transpose();
-  return robot;
-}
-
 }  // namespace
 
 std::vector<PossiblePlace> PlacesOf(const Localization& found, const MapHead& head,
@@ -49,7 +38,7 @@ std::vector<PossiblePlace> PlacesOf(const Localization& found, const MapHead& he
     const UncertainPlanarPose camera =
         CameraOnPlan(head.camera_from_given * given_from_world,
                      TransformCovariance(head.camera_from_given, covariance), head.floor_from_world);
-    places.push_back({RobotOf(camera, robot_in_camera), probability});
+    places.push_back({camera * robot_in_camera, probability});
   };
   if (found.has_fix()) {
     add(found.cam_from_world, found.covariance, found.probability);

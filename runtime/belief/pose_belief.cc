@@ -88,6 +88,16 @@ UncertainPlanarPose Corrected(const UncertainPlanarPose& place, std::span<const 
 
 }  // namespace
 
+UncertainPlanarPose operator*(const UncertainPlanarPose& body, const PlanarPose& b_from_c) {
+  UncertainPlanarPose carried;
+  carried.pose = body.pose * b_from_c;
+  const Eigen::Vector2d arm = carried.pose.position - body.pose.position;
+  Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity();
+  jacobian.topRightCorner<2, 1>() = Eigen::Vector2d(-arm.y(), arm.x());
+  carried.covariance = jacobian * body.covariance * jacobian.transpose();
+  return carried;
+}
+
 OptionTable DescribeOptions(PoseBeliefOptions* o) {
   return {
       {.name = "surprise_ratio",

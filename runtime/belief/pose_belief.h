@@ -16,6 +16,9 @@ struct UncertainPlanarPose {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
+// What stands on it at `b_from_c`, as a camera or a laser on a robot.
+UncertainPlanarPose operator*(const UncertainPlanarPose& body, const PlanarPose& b_from_c);
+
 // One place where a robot may be; of what one scan or image shows, or of a belief.
 struct PossiblePlace : UncertainPlanarPose {
   double probability = 0;

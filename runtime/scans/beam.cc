@@ -21,7 +21,7 @@ std::vector<Beam> BeamsOf(const RangeScan& scan, double max_range_m) {
   for (size_t i = 0; i < scan.ranges_m.size(); ++i) {
     const double range = scan.ranges_m[i];
     if (!(range > 0)) continue;
-    const double angle = scan.first_angle_rad + static_cast<double>(i) * scan.step_rad;
+    const double angle = scan.AngleOf(i);
     beams.push_back({{std::cos(angle), std::sin(angle)}, std::min(range, largest), range < largest});
   }
   return beams;

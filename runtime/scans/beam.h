@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "runtime/scans/carmen_log.h"
+#include "runtime/scans/range_scan.h"
 #include "runtime/scans/scan_segments.h"
 
 namespace cairn {

@@ -1,29 +1,12 @@
 #pragma once
 
-#include <limits>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/geometry/planar_pose.h"
+#include "runtime/scans/range_scan.h"
 
 namespace cairn {
-
-// Most beams of a scan that is read.
-inline constexpr int kMaxBeams = 100000;
-
-// One turn of a laser scanner.
-struct RangeScan {
-  double first_angle_rad = 0;  // of the first beam, from the robot's x, counter-clockwise
-  double step_rad = 0;         // from beam to beam
-  std::vector<double> ranges_m;
-  double max_range_m = std::numeric_limits<double>::infinity();  // beams of this range met nothing
-  PlanarPose pose;                                               // of the laser, from the log
-  double time_s = 0;                                             // of the log
-  // Of the laser by the robot's wheels alone, in a frame of theirs that drifts.
-  std::optional<PlanarPose> odometry;
-};
 
 // Reads the scans of a Carmen log:
 //   FLASER n r_1 ... r_n x y theta odom_x odom_y odom_theta ipc_timestamp host logger_timestamp

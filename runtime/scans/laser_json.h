@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "runtime/scans/carmen_log.h"
+#include "runtime/scans/range_scan.h"
 
 namespace cairn {
 

@@ -9,6 +9,7 @@
 #include "core/base/text.h"
 #include "core/files/file.h"
 #include "runtime/scans/beam.h"
+#include "runtime/scans/carmen_log.h"
 #include "runtime/scans/laser_json.h"
 
 namespace cairn {
@@ -51,6 +52,19 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
   return view;
 }
 
+bool IsJson(const std::string& text) { return Trim(text).starts_with('{'); }
+
+bool IsOfRanges(const std::string& text) {
+  const auto has_line = [&](const std::string& begin) {
+    return text.starts_with(begin) || text.find("\n" + begin) != std::string::npos;
+  };
+  return IsJson(text) || has_line("FLASER ") || has_line("ROBOTLASER1 ") || text.starts_with("\x1f\x8b");
+}
+
+Result<std::vector<RangeScan>> ParseRanges(const std::string& text, const std::string& what) {
+  return IsJson(text) ? ParseLaserJson(text, what) : ParseCarmenLog(text, what);
+}
+
 }  // namespace
 
 ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options) {
@@ -60,12 +74,7 @@ ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options) {
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
                                          const ScanSegmentsOptions& options) {
   std::vector<ScanView> views;
-  const auto has_line = [&](const std::string& begin) {
-    return text.starts_with(begin) || text.find("\n" + begin) != std::string::npos;
-  };
-  const bool is_json = Trim(text).starts_with('{');
-  const bool is_log = has_line("FLASER ") || has_line("ROBOTLASER1 ") || text.starts_with("\x1f\x8b");
-  if (!is_json && !is_log) {
+  if (!IsOfRanges(text)) {
     CAIRN_ASSIGN_OR_RETURN(ScanView view, ParseSegments(text, what, options.sigma_range_m));
     if (view.segments.empty()) {
       return MakeError(ErrorCode::kNoData,
@@ -77,10 +86,18 @@ Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::str
     views.push_back(std::move(view));
     return views;
   }
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans,
-                         is_json ? ParseLaserJson(text, what) : ParseCarmenLog(text, what));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans, ParseRanges(text, what));
   for (const RangeScan& scan : scans) views.push_back(ViewOf(scan, options));
   return views;
+}
+
+Result<std::vector<RangeScan>> ReadRangeScans(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  if (!IsOfRanges(text)) {
+    return MakeError(ErrorCode::kNoData,
+                     "{}: no scans in it (FLASER or ROBOTLASER1 lines, LaserScan messages as JSON)", path);
+  }
+  return ParseRanges(text, path);
 }
 
 Result<std::vector<ScanView>> ReadScans(const std::string& path, const ScanSegmentsOptions& options) {

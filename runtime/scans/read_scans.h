@@ -28,5 +28,7 @@ ScanView ViewOf(const RangeScan& scan, const ScanSegmentsOptions& options);
 Result<std::vector<ScanView>> ReadScans(const std::string& path, const ScanSegmentsOptions& options);
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
                                          const ScanSegmentsOptions& options);
+// The scans of a log or of messages, as they are.  Errors: as ReadScans; NoData for a file of segments, too.
+Result<std::vector<RangeScan>> ReadRangeScans(const std::string& path);
 
 }  // namespace cairn

@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/geometry/planar_pose.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn {
@@ -18,23 +19,24 @@ std::vector<Points> Runs(const RangeScan& scan, const ScanSegmentsOptions& optio
   std::vector<Points> runs;
   const double max_range = std::min(options.max_range_m, scan.max_range_m);
   bool open = false;
-  double last_range = 0;
+  double last_range = 0, last_angle = 0;
   for (size_t i = 0; i < scan.ranges_m.size(); ++i) {
     const double range = scan.ranges_m[i];
     if (!(range > 0 && range < max_range)) {
       open = false;
       continue;
     }
-    const double angle = scan.first_angle_rad + static_cast<double>(i) * scan.step_rad;
+    const double angle = scan.AngleOf(i);
+    const double step = scan.angles_rad.empty() ? scan.step_rad : std::abs(WrapAngle(angle - last_angle));
     const Vec2 point = range * Vec2(std::cos(angle), std::sin(angle));
     // A wall seen at 10 degrees has its points this much farther apart than its range times the step.
     constexpr double kGrazing = 5.8;
-    const double allowed =
-        std::max(options.max_gap_m, kGrazing * std::min(range, last_range) * scan.step_rad);
+    const double allowed = std::max(options.max_gap_m, kGrazing * std::min(range, last_range) * step);
     if (!open || (point - runs.back().back()).norm() > allowed) runs.emplace_back();
     runs.back().push_back(point);
     open = true;
     last_range = range;
+    last_angle = angle;
   }
   return runs;
 }

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "core/options/options.h"
-#include "runtime/scans/carmen_log.h"
+#include "runtime/scans/range_scan.h"
 
 namespace cairn {
 

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/scans/carmen_log.h"
 #include "runtime/scans/read_scans.h"
 
 namespace cairn {

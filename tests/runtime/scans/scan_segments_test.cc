@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "runtime/scans/carmen_log.h"
 #include "runtime/scans/read_scans.h"
 
 namespace cairn {
