@@ -38,7 +38,28 @@ Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>& OpenLocalizers(
   return *localizers;
 }
 
+Result<LocalizedImage> LocalizeImage(cairn_localizer* localizer, const cairn_image* image,
+                                     const cairn_camera* camera, const cairn_prior* prior) {
+  CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+  const auto up = std::exchange(used->up, std::nullopt);  // of this image, whatever comes
+  CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
+  CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
+  QueryFrame frame(*used->localizer, grey, chosen);
+  if (up) frame.set_up(*up);
+  CAIRN_ASSIGN_OR_RETURN(const Query* query, frame.WithAllFeatures());
+  CAIRN_ASSIGN_OR_RETURN(Localization found, used->localizer->LocalizeQuery(*query, believed));
+  if (used->log) used->log->Offer(&frame, found);
+  return LocalizedImage{std::move(found), used->map};
+}
+
 }  // namespace
+
+Result<LocalizedImage> LocalizeAlone(cairn_localizer* localizer, const cairn_image* image,
+                                     const cairn_camera* camera) {
+  return LocalizeImage(localizer, image, camera, nullptr);
+}
+
 }  // namespace cairn
 
 using namespace cairn;  // NOLINT: what follows is C, in the global namespace
@@ -176,17 +197,8 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
   return Call("cairn_localize", [&]() -> Status {
     CAIRN_RETURN_IF_ERROR(CheckFix(fix));
     Return(FixFrom({}), fix);  // after an error the caller must not find the previous fix
-    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
-    const auto up = std::exchange(used->up, std::nullopt);  // of this image, whatever comes
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
-    CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
-    CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
-    QueryFrame frame(*used->localizer, grey, chosen);
-    if (up) frame.set_up(*up);
-    CAIRN_ASSIGN_OR_RETURN(const Query* query, frame.WithAllFeatures());
-    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(*query, believed));
-    Return(FixFrom(found), fix);
-    if (used->log) used->log->Offer(&frame, found);
+    CAIRN_ASSIGN_OR_RETURN(const LocalizedImage seen, LocalizeImage(localizer, image, camera, prior));
+    Return(FixFrom(seen.found), fix);
     return Ok();
   });
 }

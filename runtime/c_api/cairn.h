@@ -1,6 +1,7 @@
 /* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, or a tracker for frames
  * in order, and hand it grey pixels.  Where did it start?  Several starts, kept in mind on the way to a goal.
  * How does it get from survey image to survey image?  A servo.  In which of many maps is it?  An atlas.
+ * Where is a robot with a laser on a floor plan?  A scan locator, or a plan tracker.
  *
  * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
  * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
@@ -11,10 +12,10 @@
  * added.  Structs begin with their size and only grow at their end: set `size` to sizeof the struct before
  * every call (CAIRN_FIX_INIT and the like do), and the library touches no more than that.
  *
- * Threads: a map is shared by all; a localizer, a tracker, a place model, starts or a servo are for one
- * thread at a time.  Frames and units: metres, radians unless a name says otherwise; the camera looks along
- * +z, x right, y down; poses are cam_from_world (point_in_camera = rotation * point_in_world + translation)
- * in the frame of the surveyed capture.
+ * Threads: a map, an atlas, a plan and a log are shared by all; whatever else is created is for one thread at
+ * a time.  Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x
+ * right, y down; poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the
+ * frame of the surveyed capture.
  */
 #ifndef CAIRN_RUNTIME_CAIRN_H_
 #define CAIRN_RUNTIME_CAIRN_H_
@@ -114,6 +115,9 @@ typedef struct cairn_place_belief cairn_place_belief;
 typedef struct cairn_servo cairn_servo;
 typedef struct cairn_atlas cairn_atlas;
 typedef struct cairn_atlas_localizer cairn_atlas_localizer;
+typedef struct cairn_plan cairn_plan;
+typedef struct cairn_scan_locator cairn_scan_locator;
+typedef struct cairn_plan_tracker cairn_plan_tracker;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -326,6 +330,38 @@ typedef struct cairn_servo_command {
   {                                                                        \
     sizeof(cairn_servo_command), 0, 0, 0, CAIRN_SERVO_LOST, 0, 0, 0, { 0 } \
   }
+
+/* One turn of a laser scanner that stands level.  Only read, and only during the call.  Beams are at
+ * first_angle_rad + i * step_rad, or where angles_rad says, counter-clockwise from the laser's x.  A range
+ * that is not more than 0, or NaN, is left out; one of max_range_m or more, or infinite, met nothing. */
+typedef struct cairn_scan {
+  size_t size;
+  int32_t num_beams;        /* 1 to 100,000 */
+  int32_t reserved;         /* 0 */
+  const double* ranges_m;   /* num_beams */
+  const double* angles_rad; /* num_beams; NULL: in equal steps */
+  double first_angle_rad, step_rad;
+  double max_range_m; /* the laser's own; 0: not known.  The option of this name bounds it, too */
+} cairn_scan;
+#define CAIRN_SCAN_INIT \
+  { sizeof(cairn_scan), 0, 0, NULL, NULL, 0, 0, 0 }
+
+/* Where a robot or its laser may be on a plan. */
+typedef struct cairn_plan_place {
+  size_t size;
+  double position_m[2]; /* floor frame */
+  double heading_rad;   /* counter-clockwise from +x, [-pi, pi] */
+  double covariance[9]; /* 3 x 3: x m, y m, heading rad */
+  double probability;
+  /* 1: no standard deviation is more than 0.25 m, or 10 degrees; 0: along some direction the place is not
+   * known, as in a corridor. */
+  int32_t determined;
+  int32_t reserved; /* 0 */
+  /* A scan locator's: of the beams that met something, those that ended at walls of the plan.  Else 0. */
+  double explained_ratio;
+} cairn_plan_place;
+#define CAIRN_PLAN_PLACE_INIT \
+  { sizeof(cairn_plan_place), {0, 0}, 0, {0}, 0, 0, 0, 0 }
 
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
@@ -585,6 +621,78 @@ CAIRN_API int32_t cairn_servo_step(cairn_servo* servo, const cairn_image* image,
 /* The last command did not move the robot, since something stands in the way: it goes the other way. */
 CAIRN_API int32_t cairn_servo_blocked(cairn_servo* servo);
 CAIRN_API int32_t cairn_servo_destroy(cairn_servo* servo);
+
+/* A floor plan, for robots with a laser (docs/floor_plans.md): of views.db or of a map, whose contents say
+ * which the file is.  CAIRN_NOT_FOUND: no such file, or a map without a plan. */
+CAIRN_API int32_t cairn_plan_open(const char* path, cairn_plan** plan);
+/* That of an open map, of one that had to be signed too. */
+CAIRN_API int32_t cairn_map_plan(const cairn_map* map, cairn_plan** plan);
+/* Its walls: x and y of start and end of each in `ends_m`, 4 * capacity numbers, floor frame, metres;
+ * *num_walls says how many there are.  `ends_m` may be NULL with a capacity of 0. */
+CAIRN_API int32_t cairn_plan_walls(const cairn_plan* plan, double* ends_m, int32_t capacity,
+                                   int32_t* num_walls);
+/* Scan locators and trackers of it stay usable. */
+CAIRN_API int32_t cairn_plan_close(cairn_plan* plan);
+
+/* Where one scan was taken, without knowing anything before.  CAIRN_NO_DATA: a plan without walls;
+ * CAIRN_UNSUPPORTED: one of more than 0.5 square kilometres. */
+CAIRN_API int32_t cairn_scan_locator_create(const cairn_plan* plan, cairn_scan_locator** locator);
+/* Any option that `cairn plan locate --help-all` lists under "Stage options": ("max_range_m", "30"; default
+ * 20), ("sigma_wall_m", "0.1").  After an error the locator is as before. */
+CAIRN_API int32_t cairn_scan_locator_set_option(cairn_scan_locator* locator, const char* name,
+                                                const char* value);
+/* *num_places: how many poses explain the scan; *is_complete (may be NULL) 0: there may be more.
+ * CAIRN_NO_DATA: fewer than three beams met something.  After an error there are none. */
+CAIRN_API int32_t cairn_scan_locator_locate(cairn_scan_locator* locator, const cairn_scan* scan,
+                                            int32_t* num_places, int32_t* is_complete);
+/* One of the poses of the laser that explain the last scan, from 0 on, the most probable first.  What the
+ * probabilities lack of 1 is for a place that the plan does not show. */
+CAIRN_API int32_t cairn_scan_locator_place(const cairn_scan_locator* locator, int32_t number,
+                                           cairn_plan_place* place);
+CAIRN_API int32_t cairn_scan_locator_destroy(cairn_scan_locator* locator);
+
+/* Where a robot is on a plan, by its scans, its wheels and what its camera's images say, any of them: several
+ * places are believed with their probabilities.  In the beginning it may be anywhere.  One per robot.  Errors
+ * of create: as cairn_scan_locator_create. */
+CAIRN_API int32_t cairn_plan_tracker_create(const cairn_plan* plan, cairn_plan_tracker** tracker);
+/* Any option that `cairn plan follow --help-all` lists under "Stage options" ("max_range_m", "30"), and where
+ * laser and camera stand on the robot: "laser_ahead_m" and "laser_left_m" of the middle of its axle,
+ * "laser_turn_deg" to the left; "camera_ahead_m", "camera_left_m", "camera_turn_deg".  The tracker begins
+ * anew; after an error it is as before. */
+CAIRN_API int32_t cairn_plan_tracker_set_option(cairn_plan_tracker* tracker, const char* name,
+                                                const char* value);
+/* Odometry since the last call: this far ahead and to the left, in the robot's frame before, and then turned.
+ */
+CAIRN_API int32_t cairn_plan_tracker_move(cairn_plan_tracker* tracker, double ahead_m, double left_m,
+                                          double turn_left_rad);
+/* The same, by where the wheels have the robot in a frame of theirs: it moved as from the pose of the call
+ * before.  The first call moves nothing. */
+CAIRN_API int32_t cairn_plan_tracker_move_to(cairn_plan_tracker* tracker, double x_m, double y_m,
+                                             double heading_rad);
+/* A scan, in the laser's frame.  CAIRN_NO_DATA: fewer than three beams met something.  After an error the
+ * tracker is as before. */
+CAIRN_API int32_t cairn_plan_tracker_see_scan(cairn_plan_tracker* tracker, const cairn_scan* scan);
+/* An image, localized by itself with a localizer of the map that the plan is of, as cairn_localize does
+ * without a prior; of several places that look alike, all count.  `fix` (may be NULL): what it says.
+ * CAIRN_UNSUPPORTED: the map's unit is not the metre. */
+CAIRN_API int32_t cairn_plan_tracker_see_image(cairn_plan_tracker* tracker, cairn_localizer* localizer,
+                                               const cairn_image* image, const cairn_camera* camera,
+                                               cairn_fix* fix);
+/* The same of a fix that was found elsewhere, as of a rig whose frame is the camera's.  Not a tracker's, nor
+ * one with a prior: what it was told before would count twice.  Without a fix nothing changes. */
+CAIRN_API int32_t cairn_plan_tracker_see_fix(cairn_plan_tracker* tracker, const cairn_map* map,
+                                             const cairn_fix* fix);
+/* What another sense says by itself: places of the robot, with position_m, heading_rad, covariance and
+ * probability; what these lack of 1 is for a place that it does not know. */
+CAIRN_API int32_t cairn_plan_tracker_see_places(cairn_plan_tracker* tracker,
+                                                const cairn_plan_place* const* places, int32_t num_places);
+/* How many places are believed, and P(anywhere else), which may be NULL. */
+CAIRN_API int32_t cairn_plan_tracker_places(const cairn_plan_tracker* tracker, int32_t* num_places,
+                                            double* elsewhere);
+/* One of them, from 0 on, the most probable first: the robot's frame. */
+CAIRN_API int32_t cairn_plan_tracker_place(const cairn_plan_tracker* tracker, int32_t number,
+                                           cairn_plan_place* place);
+CAIRN_API int32_t cairn_plan_tracker_destroy(cairn_plan_tracker* tracker);
 
 /* Many maps of a site as one (`cairn atlas`): in which of them was an image taken?  Reads the atlas alone; a
  * map's file is opened when it is needed, and must be the one that the atlas was made of (CAIRN_OTHER_MAP).

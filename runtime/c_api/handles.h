@@ -8,7 +8,7 @@
 namespace cairn {
 
 // How many kinds of handles there are, and the number of each, which differ modulo that.
-inline constexpr uint64_t kNumHandleKinds = 11;
+inline constexpr uint64_t kNumHandleKinds = 14;
 enum class HandleKind : uint64_t {
   kMap = 1,
   kLocalizer = 2,
@@ -20,7 +20,10 @@ enum class HandleKind : uint64_t {
   kPlaceBelief = 8,
   kAtlas = 9,
   kAtlasLocalizer = 10,
-  kServo = 11
+  kServo = 11,
+  kPlan = 12,
+  kScanLocator = 13,
+  kPlanTracker = 14
 };
 
 // Handles that another language holds: `Handle` is an opaque C type, never defined.  A handle is a number

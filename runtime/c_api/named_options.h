@@ -6,6 +6,7 @@
 #include "core/features/sift.h"
 #include "core/options/options.h"
 #include "runtime/atlas/atlas_localizer.h"
+#include "runtime/beams/scan_locator.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/drive/place_model.h"
 #include "runtime/drive/sure_tracker.h"
@@ -76,6 +77,19 @@ inline OptionTable DescribeOptions(FloorTrackerOptions* options) {
                      DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes),
                      DescribeOptions(&options->filter), DescribeOptions(&options->estimate)});
 }
+
+// All options of a scan locator, and of how scans are read.
+struct ScanSearchOptions {
+  ScanLocatorOptions locator;
+  ScanSegmentsOptions scan;
+};
+inline OptionTable DescribeOptions(ScanSearchOptions* options) {
+  return JoinTables({DescribeOptions(&options->locator), DescribeOptions(&options->scan)});
+}
+inline constexpr const char* kScanOptionsHelp = "`cairn plan locate --help-all` lists them";
+inline constexpr const char* kPlanTrackerOptionsHelp =
+    "`cairn plan follow --help-all` lists them, and robot_on_plan.h below include/cairn where laser and "
+    "camera stand";
 
 // For a name that is near to none.
 inline constexpr const char* kLookOptionsHelp =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,6 +39,15 @@ Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat
 // What the cameras of a rig see; pixels are not copied.
 Result<std::vector<RigImage>> RigImagesOf(const cairn_rig_image* const* images, int32_t num_images,
                                           const Map& map);
+
+// An image that a localizer was given, and the map that it is of.
+struct LocalizedImage {
+  Localization found;
+  std::shared_ptr<const Map> map;
+};
+// As cairn_localize without a prior, and logged as by that.  Its localizers are in c_api.cc.
+Result<LocalizedImage> LocalizeAlone(cairn_localizer* localizer, const cairn_image* image,
+                                     const cairn_camera* camera);
 
 // NULL: none.
 Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given);

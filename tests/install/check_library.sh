@@ -35,7 +35,7 @@ if [ -n "$foreign" ]; then
 fi
 for name in 'cairn::Map::Open(' 'cairn::Localizer::Localize(' 'cairn::RegionTracker::Track(' 'cairn::EstimateVisualPose(' 'cairn::VisualTracker::See(' \
     'cairn::PlaceModel::Make(' 'cairn::PlaceModel::LookCloser(' 'cairn::StartHypotheses::Observe(' 'cairn::PlaceBelief::See(' 'cairn::PlanRoute(' \
-    'cairn::Atlas::Open(' 'cairn::AtlasLocalizer::Localize('; do
+    'cairn::Atlas::Open(' 'cairn::AtlasLocalizer::Localize(' 'cairn::OpenPlan(' 'cairn::ScanLocator::Locate(' 'cairn::RobotOnPlan::SeeScan('; do
   nm -D --defined-only -C "$library" | grep -qF "$name" || { echo "$library does not export $name" >&2; exit 1; }
 done
 echo "$library: $(stat -Lc %s "$library") bytes; links" $needed
