@@ -1,4 +1,4 @@
-/* The C API as a C11 program uses it, and misuses it:  c_api_misuse MAP IMAGE.pgm */
+/* The C API as a C11 program uses it, and misuses it:  c_api_misuse MAP IMAGE.pgm MAP_WITH_PLAN */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -246,10 +246,69 @@ static void CheckPlaces(const char* path, const cairn_image* image) {
   CHECK(cairn_map_close(map) == CAIRN_OK);
 }
 
+/* The poster's map has no floor plan, the other has. */
+static void CheckPlans(const char* path, const char* path_with_plan) {
+  enum { kNumBeams = 90 };
+  double ranges[kNumBeams];
+  cairn_plan* plan = (cairn_plan*)&plan;
+  cairn_scan_locator* locator = (cairn_scan_locator*)&plan;
+  cairn_plan_tracker* tracker = (cairn_plan_tracker*)&plan;
+  cairn_plan_place place = CAIRN_PLAN_PLACE_INIT;
+  cairn_scan scan = CAIRN_SCAN_INIT;
+  int32_t num = -1, is_complete = -1;
+  double elsewhere = -1;
+  CHECK_ERROR(cairn_plan_open(path, &plan), CAIRN_NOT_FOUND, path);
+  CHECK(plan == NULL);
+  CHECK_ERROR(cairn_plan_open(NULL, &plan), CAIRN_INVALID_ARGUMENT, "path is NULL");
+  CHECK(cairn_plan_open(path_with_plan, &plan) == CAIRN_OK);
+  CHECK(cairn_plan_walls(plan, NULL, 0, &num) == CAIRN_OK && num > 10);
+  CHECK(cairn_scan_locator_create(plan, &locator) == CAIRN_OK);
+  CHECK(cairn_plan_tracker_create(plan, &tracker) == CAIRN_OK);
+  CHECK_ERROR(cairn_map_close((cairn_map*)plan), CAIRN_INVALID_ARGUMENT, "not an open map");
+  CHECK_ERROR(cairn_plan_close((cairn_plan*)locator), CAIRN_INVALID_ARGUMENT, "not a plan");
+  CHECK_ERROR(cairn_tracker_destroy((cairn_tracker*)tracker), CAIRN_INVALID_ARGUMENT, "not a tracker");
+  CHECK(cairn_plan_close(plan) == CAIRN_OK); /* both keep what they need */
+  CHECK_ERROR(cairn_plan_close(plan), CAIRN_INVALID_ARGUMENT, "not a plan");
+
+  CHECK_ERROR(cairn_scan_locator_locate(locator, &scan, &num, NULL), CAIRN_INVALID_ARGUMENT,
+              "num_beams is 0");
+  scan.num_beams = kNumBeams;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_INVALID_ARGUMENT, "ranges_m is NULL");
+  scan.ranges_m = ranges;
+  scan.step_rad = 0.01;
+  for (int i = 0; i < kNumBeams; ++i) ranges[i] = -1;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_NO_DATA, "at least three");
+  for (int i = 0; i < kNumBeams; ++i) ranges[i] = 2.5;
+  scan.step_rad = NAN;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_INVALID_ARGUMENT, "angle of beam 0");
+  scan.step_rad = 1;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_INVALID_ARGUMENT, "degrees");
+  scan.step_rad = 0.01;
+  scan.size = 4;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_INVALID_ARGUMENT, "scan->size is 4");
+  scan.size = sizeof scan;
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, NULL), CAIRN_INVALID_ARGUMENT, "scan is NULL");
+  CHECK_ERROR(cairn_plan_tracker_see_scan(NULL, &scan), CAIRN_INVALID_ARGUMENT, "plan tracker is NULL");
+  CHECK_ERROR(cairn_plan_tracker_move(tracker, NAN, 0, 0), CAIRN_INVALID_ARGUMENT, "not finite");
+  CHECK_ERROR(cairn_plan_tracker_set_option(tracker, "laser_ahead", "1"), CAIRN_INVALID_ARGUMENT,
+              "'laser_ahead_m'");
+  CHECK(cairn_plan_tracker_places(tracker, &num, &elsewhere) == CAIRN_OK && num == 0 && elsewhere == 1);
+  CHECK_ERROR(cairn_plan_tracker_place(tracker, 0, &place), CAIRN_INVALID_ARGUMENT, "place 0 of 0");
+  CHECK(cairn_scan_locator_locate(locator, &scan, &num, &is_complete) == CAIRN_OK);
+  CHECK(num >= 0 && (is_complete == 0 || is_complete == 1));
+
+  CHECK(cairn_scan_locator_destroy(locator) == CAIRN_OK && cairn_plan_tracker_destroy(tracker) == CAIRN_OK);
+  CHECK_ERROR(cairn_scan_locator_locate(locator, &scan, &num, NULL), CAIRN_INVALID_ARGUMENT, "destroyed");
+  CHECK(num == 0);
+  CHECK_ERROR(cairn_plan_tracker_see_scan(tracker, &scan), CAIRN_INVALID_ARGUMENT, "destroyed");
+  CHECK(cairn_scan_locator_destroy(NULL) == CAIRN_OK && cairn_plan_tracker_destroy(NULL) == CAIRN_OK &&
+        cairn_plan_close(NULL) == CAIRN_OK);
+}
+
 int main(int argc, char** argv) {
   int width = 0, height = 0;
-  uint8_t* pixels = argc == 3 ? ReadPgm(argv[2], &width, &height) : NULL;
-  if (pixels == NULL) return fprintf(stderr, "usage: c_api_misuse MAP IMAGE.pgm\n"), 2;
+  uint8_t* pixels = argc == 4 ? ReadPgm(argv[2], &width, &height) : NULL;
+  if (pixels == NULL) return fprintf(stderr, "usage: c_api_misuse MAP IMAGE.pgm MAP_WITH_PLAN\n"), 2;
   CHECK(strcmp(cairn_error_name(CAIRN_CORRUPT), "corrupt") == 0);
   CHECK(strcmp(cairn_error_name(4711), "unknown") == 0 && strcmp(cairn_reason_name(-1), "unknown") == 0);
   CHECK(strcmp(cairn_scope_name(CAIRN_SCOPE_VOTES), "votes") == 0 &&
@@ -271,6 +330,7 @@ int main(int argc, char** argv) {
   CheckFixes(localizer, &image);
   CheckTrackers(argv[1], &image);
   CheckPlaces(argv[1], &image);
+  CheckPlans(argv[1], argv[3]);
 
   CHECK_ERROR(cairn_localizer_set_option(localizer, "min_num_inlier", "9"), CAIRN_INVALID_ARGUMENT,
               "'min_num_inliers'");

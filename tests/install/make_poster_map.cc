@@ -1,6 +1,7 @@
 // Writes the poster's map and two pictures, of it and of nothing, and the map, pictures (0.pgm, 1.pgm, ...)
 // and odometry of a drive, and the map and pictures (wing0.pgm, ...) of two wings that look alike,
-// and those (room0.pgm, ...) of a room through which a robot is steered:
+// and those (room0.pgm, ...) of a room through which a robot is steered, and the map with its plan, and
+// scans and odometry (scans.txt) of a drive with a laser through the room:
 // make_poster_map FOLDER
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/blocks/map_rows.h"
+#include "tests/install/laser_room.h"
 #include "tests/install/poster_drive.h"
 #include "tests/install/poster_room.h"
 #include "tests/install/poster_wings.h"
@@ -46,6 +48,20 @@ bool WriteRoom(const std::string& folder) {
   return cairn::WriteMapRows(room.rows(), folder + "/room.cairn").ok();
 }
 
+// A scan a line.
+bool WriteLaser(const std::string& folder) {
+  std::ofstream scans(folder + "/scans.txt");
+  scans << "# metres ahead, metres to the left, radians turned to the left; ranges, metres, from pi on, "
+           "counter-clockwise\n";
+  scans.precision(17);
+  for (const cairn::LaserStep& step : cairn::LaserDrive()) {
+    scans << step.moved.way_m.x() << " " << step.moved.way_m.y() << " " << step.moved.turn_left_rad;
+    for (const double range : step.scan.ranges_m) scans << " " << range;
+    scans << "\n";
+  }
+  return scans.flush() && cairn::WriteMapRows(cairn::LaserRoomRows(), folder + "/laser.cairn").ok();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -59,6 +75,6 @@ int main(int argc, char** argv) {
   const cv::Mat blank(scene.camera.height, scene.camera.width, CV_8UC1, cv::Scalar(90));
   const bool written = cv::imwrite(folder + "/poster.pgm", RenderPoster(scene, PosterQueryPose())) &&
                        cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder) &&
-                       WriteWings(folder) && WriteRoom(folder);
+                       WriteWings(folder) && WriteRoom(folder) && WriteLaser(folder);
   return written ? 0 : 1;
 }
