@@ -17,6 +17,7 @@
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
 #include "runtime/python/places.h"
+#include "runtime/python/plans.h"
 #include "runtime/python/servos.h"
 #include "runtime/python/trackers.h"
 
@@ -351,4 +352,5 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindPlaces(module);
   cairn::BindServos(module);
   cairn::BindAtlases(module);
+  cairn::BindPlans(module);
 }

@@ -35,6 +35,8 @@ PYTHONPATH=$(dirname "$module") "$folder/robot/follow.py" "$poster/drive.cairn" 
 PYTHONPATH=$(dirname "$module") "$(dirname "$0")/check_starts.sh" "$poster" "$folder/robot/start.py"
 "$(dirname "$0")/check_steering.sh" "$poster" "$folder/robot/build/steer_cc" "$folder/robot/build/steer_c"
 PYTHONPATH=$(dirname "$module") "$(dirname "$0")/check_steering.sh" "$poster" "$folder/robot/steer.py"
+"$(dirname "$0")/check_lasers.sh" "$poster" "$folder/robot/build/laser_cc" "$folder/robot/build/laser_c"
+PYTHONPATH=$(dirname "$module") "$(dirname "$0")/check_lasers.sh" "$poster" "$folder/robot/laser.py"
 export PKG_CONFIG_PATH="$lib/pkgconfig" LD_LIBRARY_PATH="$lib"
 cd "$folder/robot"
 cc -std=c11 -Wall -Wextra -Werror -pedantic where.c -o where_c $(pkg-config --cflags --libs cairn-runtime)

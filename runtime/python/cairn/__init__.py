@@ -13,6 +13,8 @@ A robot that may be in any of many maps asks an Atlas of them: AtlasLocalizer.
 
 A way over survey images is Map.route; a Servo steers a robot from one to the next by its camera.
 
+A robot with a laser asks a floor plan: a ScanLocator where one scan was taken, a PlanTracker where it is by scans, wheels and images.
+
 Frames in order go to a Tracker (in space) or a VisualTracker (on the floor), with odometry where there is any, one per camera.
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
@@ -27,14 +29,20 @@ from ._cairn import (
     Fix,
     FloorFix,
     Localizer,
+    LocatedScan,
     Log,
     Map,
     PlaceBelief,
     PlaceModel,
     PlaceScores,
+    Plan,
+    PlanPlace,
+    PlanTracker,
     Prior,
     RigImage,
     Route,
+    Scan,
+    ScanLocator,
     Servo,
     ServoCommand,
     StartHypotheses,
@@ -44,6 +52,7 @@ from ._cairn import (
     Up,
     VisualTracker,
     __version__,
+    read_scans,
     roll_back_map,
     update_map,
 )
@@ -58,14 +67,20 @@ __all__ = [
     "Fix",
     "FloorFix",
     "Localizer",
+    "LocatedScan",
     "Log",
     "Map",
     "PlaceBelief",
     "PlaceModel",
     "PlaceScores",
+    "Plan",
+    "PlanPlace",
+    "PlanTracker",
     "Prior",
     "RigImage",
     "Route",
+    "Scan",
+    "ScanLocator",
     "Servo",
     "ServoCommand",
     "StartHypotheses",
@@ -75,6 +90,7 @@ __all__ = [
     "Up",
     "VisualTracker",
     "__version__",
+    "read_scans",
     "roll_back_map",
     "update_map",
 ]

@@ -316,6 +316,136 @@ class AtlasLocalizer:
         """`camera` None: each map's own camera of the image's size."""
 
 @final
+class Plan:
+    """A floor plan: immutable, shared by all threads."""
+
+    @staticmethod
+    def open(path: str | PathLike[str]) -> Plan:
+        """Of views.db, or of a map that has one.  Raises Error: not_found (no such file, or a map without a plan)."""
+    @staticmethod
+    def of_map(map: Map) -> Plan:
+        """That of an open map, of one that had to be signed too.  Raises Error: not_found."""
+    @property
+    def walls(self) -> NDArray[np.float64]:
+        """x and y of start and end of each, floor frame, metres: (walls, 4)"""
+
+@final
+class Scan:
+    """One turn of a laser scanner that stands level, in the laser's frame: x ahead, angles counter-clockwise from it."""
+
+    def __init__(
+        self,
+        ranges: Sequence[float] | NDArray[np.floating],
+        angles: Sequence[float] | NDArray[np.floating] | None = None,
+        *,
+        first_angle_rad: float = 0.0,
+        step_rad: float = 0.0,
+        max_range_m: float = ...,
+    ) -> None:
+        """`ranges`: metres, (beams,); one that is not more than 0, or NaN, is left out; one of max_range_m or more, or infinite, met nothing.
+
+        `angles`: radians, (beams,); None: first_angle_rad + i * step_rad.  Raises a ValueError for no beams, another number
+        of angles, angles that are not finite or sweep more than a turn.
+        """
+    @property
+    def ranges(self) -> NDArray[np.float64]:
+        """Metres: (beams,)"""
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """Radians: (beams,)"""
+    @property
+    def max_range_m(self) -> float: ...
+    @property
+    def odometry(self) -> NDArray[np.float64] | None:
+        """Of a log's: where the wheels have the laser, x (m), y (m), heading (rad), in a frame of theirs: (3,)"""
+    def __len__(self) -> int: ...
+
+@final
+class PlanPlace:
+    """Where a robot or its laser may be on a plan."""
+
+    def __init__(
+        self,
+        position: Sequence[float] | NDArray[np.float64],
+        heading_rad: float,
+        covariance: Sequence[Sequence[float]] | NDArray[np.float64],
+        probability: float,
+    ) -> None:
+        """For what another sense says: PlanTracker.see_places."""
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Floor frame, metres: (2,)"""
+    @property
+    def heading_rad(self) -> float:
+        """Counter-clockwise from +x, [-pi, pi]"""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """x (m), y (m), heading (rad): (3, 3)"""
+    @property
+    def probability(self) -> float: ...
+    @property
+    def is_determined(self) -> bool:
+        """False: along some direction the place is not known, as in a corridor: to more than 0.25 m, or 10 degrees"""
+    @property
+    def explained_ratio(self) -> float | None:
+        """Of a located scan: of the beams that met something, those that ended at walls of the plan"""
+
+@final
+class LocatedScan:
+    """Where one scan may have been taken."""
+
+    @property
+    def places(self) -> list[PlanPlace]:
+        """Of the laser, the most probable first; what their probabilities lack of 1 is for a place that the plan does not show"""
+    @property
+    def is_complete(self) -> bool:
+        """False: there may be more places"""
+
+@final
+class ScanLocator:
+    """Finds where a scan was taken, without knowing anything before.  Immutable, shared by all threads."""
+
+    def __init__(self, plan: Plan, **options: bool | int | float | str) -> None:
+        """`options`: those that `cairn plan locate --help-all` lists under "Stage options", such as max_range_m=30 (20).
+
+        Raises Error: no_data (a plan without walls), unsupported (one of more than 0.5 square kilometres).
+        """
+    def locate(self, scan: Scan) -> LocatedScan:
+        """Raises Error: no_data (fewer than three beams met something).  Releases the interpreter's lock meanwhile."""
+
+@final
+class PlanTracker:
+    """Where a robot is on a plan, by its scans, its wheels and what its camera's images say, any of them.
+
+    In the beginning it may be anywhere.  One per robot: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, plan: Plan, **options: bool | int | float | str) -> None:
+        """`options`: those that `cairn plan follow --help-all` lists under "Stage options", such as max_range_m=30 (20), and
+        where laser and camera stand on the robot: laser_ahead_m and laser_left_m of the middle of its axle, laser_turn_deg to
+        the left; camera_ahead_m, camera_left_m, camera_turn_deg.
+
+        Raises Error: as ScanLocator.
+        """
+    def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
+        """Odometry since the last call: this far in the robot's frame before, and then turned."""
+    def move_to(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """The same, by where the wheels have the robot in a frame of theirs.  The first call moves nothing."""
+    def see_scan(self, scan: Scan) -> None:
+        """Raises Error: no_data (fewer than three beams met something).  After an Error the tracker is as before."""
+    def see_fix(self, map: Map, fix: Fix) -> None:
+        """What an image says by itself: a Localizer's fix without a prior, in the map that the plan is of.  Of several places
+        that look alike, all count; no fix at all changes nothing.  Raises Error: unsupported (the map's unit is not the metre)."""
+    def see_places(self, places: Sequence[PlanPlace]) -> None:
+        """What another sense says by itself: places of the robot.  What their probabilities lack of 1 is for a place that it
+        does not know.  Raises Error: invalid_argument (not finite, no covariance, more than 1 in all)."""
+    @property
+    def places(self) -> list[PlanPlace]:
+        """Of the robot, the most probable first; with `elsewhere` their probabilities sum to 1"""
+    @property
+    def elsewhere(self) -> float: ...
+
+@final
 class Up:
     """Which way is up, as an accelerometer says while the robot does not speed up or brake, or an IMU."""
 
@@ -585,6 +715,9 @@ class VisualTracker:
         """
     def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> FloorFix:
         """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
+
+def read_scans(path: str | PathLike[str]) -> list[Scan]:
+    """The scans of a Carmen log, or of ROS messages as JSON lines, with their odometry.  Raises Error: not_found, corrupt, no_data."""
 
 def update_map(
     map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None, name: str = "",
