@@ -16,6 +16,7 @@
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
+#include <sensor_msgs/LaserScan.h>
 #include <sensor_msgs/PointCloud.h>
 #include <std_msgs/String.h>
 
@@ -94,6 +95,10 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("where", &p->where);
   reader.Read("where_period_s", &p->where_period_s);
   reader.Read("min_place_probability", &p->min_place_probability);
+  reader.Read("plan", &p->plan);
+  reader.Read("laser_in_robot", &p->laser_in_robot);
+  reader.Read("laser_max_range_m", &p->laser_max_range_m);
+  reader.Read("min_plan_probability", &p->min_plan_probability);
   *wrong = reader.wrong();
   return wrong->empty();
 }
@@ -150,7 +155,14 @@ class LocalizerNode {
     next_ = node.advertise<std_msgs::String>("next", 1, true);
     if (parameters_.steer) velocity_ = std::make_unique<Velocity>(parameters_.stop_after_s);
     if (parameters_.where) places_ = node.advertise<sensor_msgs::PointCloud>("places", 1);
-    if (parameters_.where || parameters_.follow)
+    if (localizer_->IsOnPlan()) {
+      plan_poses_ = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("plan_pose", 1);
+      plan_places_ = node.advertise<geometry_msgs::PoseArray>("plan_places", 1);
+      plan_beliefs_ = node.advertise<sensor_msgs::PointCloud>("plan_belief", 1);
+      // Only the newest, as of images.
+      scans_ = node.subscribe("scan", 1, &LocalizerNode::OnScan, this, ros::TransportHints().tcpNoDelay());
+    }
+    if (parameters_.where || parameters_.follow || localizer_->IsOnPlan())
       odometry_ = node.subscribe("odom", 1000, &LocalizerNode::OnOdometry, this);
     if (parameters_.gravity) imu_ = node.subscribe("imu", 1000, &LocalizerNode::OnImu, this);
     goals_ = node.subscribe("goal", 1, &LocalizerNode::OnGoal, this);
@@ -179,6 +191,7 @@ class LocalizerNode {
       PublishPose(answer, image->header.stamp);
     }
     if (answer.places) PublishPlaces(*answer.places, image->header.stamp);
+    if (answer.plan_places) PublishPlan(*answer.plan_places, image->header.stamp);
     const std::chrono::duration<double, std::milli> in_all = steady_clock::now() - begin;
     PublishDiagnostics(*image, answer, in_all.count());
   }
@@ -196,6 +209,24 @@ class LocalizerNode {
     if (!steered.error.empty()) ROS_ERROR_THROTTLE(10, "%s", steered.error.c_str());
     steering_ = steered.error.empty() ? steered.state : "error";
     steering_why_ = steered.error.empty() ? steered.why : steered.error;
+  }
+
+  void OnScan(const sensor_msgs::LaserScan::ConstPtr& scan) {
+    const LaserScan turn = {scan->header.stamp.toSec(),
+                            scan->angle_min,
+                            scan->angle_increment,
+                            scan->range_min,
+                            scan->range_max,
+                            scan->ranges.data(),
+                            scan->ranges.size()};
+    const std::optional<PlanPlaces> found = localizer_->Scan(turn);
+    ++num_scans_;
+    if (!found) {
+      ROS_WARN_THROTTLE(60, "no odometry at a scan's time: it is located by itself, and not every one is");
+      return;
+    }
+    PublishPlan(*found, scan->header.stamp);
+    PublishPlanDiagnostics(*scan, *found);
   }
 
   void OnOdometry(const nav_msgs::Odometry::ConstPtr& message) {
@@ -284,6 +315,67 @@ class LocalizerNode {
     places_.publish(places);
   }
 
+  void PublishPlan(const PlanPlaces& found, const ros::Time& stamp) {
+    if (!found.error.empty()) {
+      ROS_ERROR_THROTTLE(10, "%s", found.error.c_str());
+      return;
+    }
+    geometry_msgs::PoseArray places;
+    places.header.stamp = stamp;
+    places.header.frame_id = parameters_.map_frame;
+    sensor_msgs::PointCloud belief;
+    belief.header = places.header;
+    belief.channels.resize(2);
+    belief.channels[0].name = "probability";
+    belief.channels[1].name = "is_determined";
+    for (const PlanPlaces::Place& place : found.places) {
+      places.poses.push_back(PoseMessage(place.position, place.orientation_xyzw));
+      belief.points.push_back(PointMessage(place.position));
+      belief.channels[0].values.push_back(static_cast<float>(place.probability));
+      belief.channels[1].values.push_back(place.is_determined ? 1 : 0);
+    }
+    plan_places_.publish(places);
+    plan_beliefs_.publish(belief);
+    if (!IsSure(found)) return;
+    geometry_msgs::PoseWithCovarianceStamped pose;
+    pose.header = places.header;
+    pose.pose.pose = places.poses[0];
+    for (int i = 0; i < 36; ++i) pose.pose.covariance[i] = found.places[0].covariance[i];
+    plan_poses_.publish(pose);
+  }
+
+  bool IsSure(const PlanPlaces& found) const {
+    return !found.places.empty() && found.places[0].probability >= parameters_.min_plan_probability;
+  }
+
+  // As those of images.
+  void PublishPlanDiagnostics(const sensor_msgs::LaserScan& scan, const PlanPlaces& found) {
+    Diagnostic status;
+    status.name = ros::this_node::getName() + ": floor plan";
+    status.hardware_id = scan.header.frame_id;
+    const bool is_error = !found.error.empty();
+    const bool is_sure = found.reason.empty() && IsSure(found);
+    status.level = is_error ? Diagnostic::ERROR : is_sure ? Diagnostic::OK : Diagnostic::WARN;
+    status.message = is_error                ? found.error
+                     : !found.reason.empty() ? found.reason
+                     : is_sure               ? "sure"
+                                             : "no place is probable enough";
+    const steady_clock::time_point now = steady_clock::now();
+    const bool is_due =
+        now - last_plan_published_ >= std::chrono::duration<double>(parameters_.diagnostics_period_s);
+    if (status.level == last_plan_level_ && !is_due) return;
+    last_plan_published_ = now;
+    last_plan_level_ = status.level;
+    status.values = {KeyValue("map", localizer_->map_name()), KeyValue("scans", num_scans_),
+                     KeyValue("plan_places", found.places.size()),
+                     KeyValue("plan_probability", found.places.empty() ? 0 : found.places[0].probability),
+                     KeyValue("plan_elsewhere", found.elsewhere)};
+    diagnostic_msgs::DiagnosticArray message;
+    message.header.stamp = scan.header.stamp;
+    message.status = {status};
+    diagnostics_.publish(message);
+  }
+
   void PublishPose(const Answer& answer, const ros::Time& stamp) {
     geometry_msgs::PoseWithCovarianceStamped message;
     message.header.stamp = stamp;
@@ -342,16 +434,17 @@ class LocalizerNode {
   NodeParameters parameters_;
   MapLocalizer* localizer_;
   ros::Publisher poses_, diagnostics_, starts_, way_, verdicts_, next_, places_;
-  ros::Subscriber images_, goals_, progress_, odometry_, imu_;
+  ros::Publisher plan_poses_, plan_places_, plan_beliefs_;
+  ros::Subscriber images_, goals_, progress_, odometry_, imu_, scans_;
   std::unique_ptr<Velocity> velocity_;  // null: the robot is not steered
   double steered_s_ = 0;                // when the image of the last command was taken
   std::string next_name_, steering_, steering_why_;
   Places::Place likely_place_;
   double elsewhere_ = 1;
   ros::Time asked_;  // when a goal or a report came last
-  int64_t num_images_ = 0, num_fixes_ = 0;
-  int last_level_ = -1;
-  steady_clock::time_point last_published_;
+  int64_t num_images_ = 0, num_fixes_ = 0, num_scans_ = 0;
+  int last_level_ = -1, last_plan_level_ = -1;
+  steady_clock::time_point last_published_, last_plan_published_;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "ros/gravity.h"
 #include "ros/grey_pixels.h"
 #include "ros/odometry.h"
+#include "ros/plan_follower.h"
 #include "ros/robot_pose.h"
 #include "ros/start_finder.h"
 #include "ros/steerer.h"
@@ -74,6 +75,7 @@ struct MapLocalizer::State {
   std::optional<Steerer> steerer;          // with Parameters::steer
   std::optional<Whereabouts> whereabouts;  // with Parameters::where
   std::optional<Gravity> gravity;          // with Parameters::gravity
+  std::optional<PlanFollower> plan;        // with Parameters::plan, where the map has one
   double place_probability = 0;            // of the last fix's place
 
   static LocalizerOptions WithBudget(const Parameters& parameters) {
@@ -83,7 +85,8 @@ struct MapLocalizer::State {
     return options;
   }
 
-  // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, SharedLog::Open.
+  // What a map and parameters allow.  Errors: as Steerer::Make, Whereabouts::Make, PlanFollower::Make,
+  // SharedLog::Open.
   Status Begin() {
     if (parameters.steer) {
       CAIRN_ASSIGN_OR_RETURN(steerer, Steerer::Make(map, parameters, robot_from_camera));
@@ -104,8 +107,27 @@ struct MapLocalizer::State {
       CAIRN_ASSIGN_OR_RETURN(whereabouts,
                              Whereabouts::Make(map, robot_from_camera, parameters.where_period_s));
     }
+    if (parameters.plan) {
+      CAIRN_RETURN_IF_ERROR(BeginPlan());
+    }
     if (parameters.log.empty()) return Ok();
     CAIRN_ASSIGN_OR_RETURN(log, SharedLog::Open(parameters.log, *map, parameters.log_max_mb_per_day));
+    return Ok();
+  }
+
+  Status BeginPlan() {
+    if (!(parameters.min_plan_probability >= 0 && parameters.min_plan_probability < 1))
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "~min_plan_probability is {}; expected 0 or more, below 1",
+                       parameters.min_plan_probability);
+    if (!(parameters.where_period_s >= 0) || !std::isfinite(parameters.where_period_s))
+      return MakeError(ErrorCode::kInvalidArgument, "~where_period_s is {}; expected 0 or more",
+                       parameters.where_period_s);
+    CAIRN_ASSIGN_OR_RETURN(const Pose robot_from_laser,
+                           MountingOf("laser_in_robot", parameters.laser_in_robot));
+    if (!map->has_floor_plan()) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(plan, PlanFollower::Make(map, robot_from_camera, robot_from_laser,
+                                                    parameters.laser_max_range_m, parameters.where_period_s));
     return Ok();
   }
 
@@ -148,7 +170,8 @@ struct MapLocalizer::State {
 
   // With what a log and a belief need of the image.
   Result<Localization> LocateByFeatures(const cv::Mat& grey, const Camera& camera, double stamp_s,
-                                        std::optional<Places>* places) {
+                                        std::optional<Places>* places,
+                                        std::optional<PlanPlaces>* plan_places) {
     QueryFrame frame(localizer, grey, camera);
     if (const std::optional<SensedUp> up = UpAt(stamp_s)) frame.set_up(*up);
     const auto by_itself = [&]() -> Result<Localization> {
@@ -156,11 +179,24 @@ struct MapLocalizer::State {
       return localizer.LocalizeQuery(*query, std::nullopt);
     };
     CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow ? tracker.TrackFrame(&frame) : by_itself());
+    if (IsForPlan(stamp_s)) {
+      // What a tracker expected would count twice; to look again may take more than is allowed.
+      const bool is_followed = found.scope == Scope::kTrack;
+      if (!is_followed) *plan_places = plan->SeeImage(found, stamp_s);
+      if (is_followed && parameters.budget_ms == 0) {
+        CAIRN_ASSIGN_OR_RETURN(const Localization alone, by_itself());
+        *plan_places = plan->SeeImage(alone, stamp_s);
+      }
+    }
     if (whereabouts) {
       CAIRN_RETURN_IF_ERROR(Believe(&frame, stamp_s, &found, places));
     }
     if (log) log->Offer(&frame, found);
     return found;
+  }
+
+  bool IsForPlan(double stamp_s) const {
+    return plan && IsMetric(map->head().frame) && plan->IsImageDue(stamp_s);
   }
 
   std::optional<SensedUp> UpAt(double stamp_s) const { return gravity ? gravity->At(stamp_s) : std::nullopt; }
@@ -194,7 +230,8 @@ struct MapLocalizer::State {
     return Ok();
   }
 
-  Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places) {
+  Result<Localization> Locate(const Image& image, double* library_ms, std::optional<Places>* places,
+                              std::optional<PlanPlaces>* plan_places) {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
     const std::optional<FloorMotion> moved = odometry.MoveTo(image.stamp_s);
@@ -202,7 +239,8 @@ struct MapLocalizer::State {
       CAIRN_RETURN_IF_ERROR(tracker.Move(moved->way_m, moved->turn_left_rad));
     const auto begin = std::chrono::steady_clock::now();
     const auto locate = [&]() -> Result<Localization> {
-      if (log || whereabouts) return LocateByFeatures(grey, camera, image.stamp_s, places);
+      if (log || whereabouts || IsForPlan(image.stamp_s))
+        return LocateByFeatures(grey, camera, image.stamp_s, places, plan_places);
       const std::optional<SensedUp> up = UpAt(image.stamp_s);
       if (!parameters.follow) return localizer.Localize(grey, camera, std::nullopt, up);
       if (up) CAIRN_RETURN_IF_ERROR(tracker.SenseUp(*up));
@@ -258,7 +296,8 @@ std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, i
 
 Answer MapLocalizer::Locate(const Image& image) {
   Answer answer;
-  const Result<Localization> found = state_->Locate(image, &answer.library_ms, &answer.places);
+  const Result<Localization> found =
+      state_->Locate(image, &answer.library_ms, &answer.places, &answer.plan_places);
   if (!found.ok()) {
     answer.is_error = true;
     answer.reason = ErrorCodeName(found.error().code);
@@ -332,7 +371,15 @@ Steered MapLocalizer::Steer(const Image& image) {
 bool MapLocalizer::AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad) {
   const PlanarPose pose{{x_m, y_m}, heading_rad};
   return state_->odometry.Add(stamp_s, pose).ok() &&
-         (!state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, pose).ok());
+         (!state_->whereabouts || state_->whereabouts->AddOdometry(stamp_s, pose).ok()) &&
+         (!state_->plan || state_->plan->AddOdometry(stamp_s, pose).ok());
+}
+
+bool MapLocalizer::IsOnPlan() const { return state_->plan.has_value(); }
+
+std::optional<PlanPlaces> MapLocalizer::Scan(const LaserScan& scan) {
+  if (!state_->plan) return std::nullopt;
+  return state_->plan->See(scan);
 }
 
 bool MapLocalizer::AddUp(double stamp_s, double x, double y, double z, bool is_acceleration) {

@@ -43,6 +43,11 @@ struct Parameters {
   bool where = false;
   double where_period_s = 1;
   double min_place_probability = 0;  // with `where`: of a fix's place, by all images so far; 0: every fix
+  // In a map with a floor plan the robot is looked for on it by its laser (plan_follower.h).
+  bool plan = true;
+  std::vector<double> laser_in_robot;  // as camera_in_robot; empty: at the middle of the axle, looking ahead
+  double laser_max_range_m = 20;       // beams of more met nothing
+  double min_plan_probability = 0.9;   // of a place that is published as the robot's
 };
 
 struct Image {
@@ -71,6 +76,30 @@ struct Places {
   double elsewhere = 0;       // P(at no place of the map)
 };
 
+// One turn of a laser, with the fields of sensor_msgs/LaserScan.
+struct LaserScan {
+  double stamp_s = 0;  // 0: now
+  double first_angle_rad = 0, step_rad = 0;
+  double range_min_m = 0, range_max_m = 0;
+  const float* ranges_m = nullptr;
+  size_t num_ranges = 0;
+};
+
+// Where a robot may be on its map's floor plan.
+struct PlanPlaces {
+  std::string error;   // why the scan or image could not be tried; empty: it could
+  std::string reason;  // why it said nothing; empty: it did
+  struct Place {
+    double position[3] = {0, 0, 0};  // of the robot's base on the floor, in the map's frame
+    double orientation_xyzw[4] = {0, 0, 0, 1};
+    double covariance[36] = {0};  // as Answer's; no height, roll or pitch
+    double probability = 0;
+    bool is_determined = false;  // false: along some direction the place is not known, as in a corridor
+  };
+  std::vector<Place> places;  // the most probable first; those of a probability below 0.001 are left out
+  double elsewhere = 1;       // P(anywhere else)
+};
+
 struct Answer {
   bool is_error = false;  // the image could not be tried
   bool has_fix = false;
@@ -80,11 +109,12 @@ struct Answer {
   double orientation_xyzw[4] = {0, 0, 0, 1};
   double covariance[36] = {0};  // x, y, z, rotation about the map's x, y, z
   int num_features = 0, num_inliers = 0, region = -1;
-  std::string scope;             // among which landmarks it was found
-  double probability = 0;        // that the fix is right
-  double work_ms = 0;            // what the answer took, as budget_ms is counted
-  double library_ms = 0;         // in the runtime: the rest is the node's
-  std::optional<Places> places;  // of an image by which whereabouts were looked for
+  std::string scope;                      // among which landmarks it was found
+  double probability = 0;                 // that the fix is right
+  double work_ms = 0;                     // what the answer took, as budget_ms is counted
+  double library_ms = 0;                  // in the runtime: the rest is the node's
+  std::optional<Places> places;           // of an image by which whereabouts were looked for
+  std::optional<PlanPlaces> plan_places;  // of one that counted on the floor plan
 };
 
 // Where a robot may have started.
@@ -132,6 +162,11 @@ class MapLocalizer {
 
   // Where odometry has the robot: metres, radians to the left, in a frame of its own.  False: not finite.
   bool AddOdometry(double stamp_s, double x_m, double y_m, double heading_rad);
+
+  // Whether the robot is looked for on a floor plan: Parameters::plan, and the map has one.
+  bool IsOnPlan() const;
+  // Where it may be after a scan.  None: without odometry, not every scan counts.
+  std::optional<PlanPlaces> Scan(const LaserScan& scan);
 
   // Which way is up in an IMU's frame, by its attitude or by its acceleration, which is up where the robot
   // does not speed up: by 1 m/s^2 it errs by 6 degrees, and is taken for no better.  False: no direction, or

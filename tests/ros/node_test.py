@@ -52,7 +52,7 @@ import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Twist  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from sensor_msgs.msg import Image, Imu, PointCloud  # noqa: E402
+from sensor_msgs.msg import Image, Imu, LaserScan, PointCloud  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 
@@ -246,18 +246,21 @@ class Node(unittest.TestCase):
         """A node of the room of tests/install/poster_room.h, or of another map, with topics of its own, and what it says."""
 
         def __init__(self, test, name, *arguments, map="room"):
-            topics = ("image", "goal", "odom", "imu", "cmd_vel", "next", "verdict", "places", "pose", "starts", "way", "progress")
+            topics = ("image", "goal", "odom", "imu", "cmd_vel", "next", "verdict", "places", "pose", "starts", "way", "progress",
+                      "scan", "plan_pose", "plan_places", "plan_belief")
             self.node = test.start(f"__name:={name}", f"_map:={POSTER / map}.cairn", "_diagnostics_period_s:=0",
                                    f"/diagnostics:={name}_diagnostics", *[f"{topic}:={name}_{topic}" for topic in topics], *arguments)
             test.addCleanup(self.node.wait)
             test.addCleanup(self.node.terminate)
             self.test, self.said, self.stamp = test, {}, rospy.Time.from_sec(time.time())
             self.publishers = {topic: rospy.Publisher(f"{name}_{topic}", kind, queue_size=10)
-                               for topic, kind in (("image", Image), ("goal", String), ("odom", Odometry), ("imu", Imu), ("progress", String))}
+                               for topic, kind in (("image", Image), ("goal", String), ("odom", Odometry), ("imu", Imu), ("progress", String),
+                                                ("scan", LaserScan))}
             # A robot that is not steered has no cmd_vel to listen to, one without ~where no places.
             self.subscribers = [rospy.Subscriber(f"{name}_{topic}", kind, lambda m, topic=topic: self.said.setdefault(topic, []).append(m))
                                 for topic, kind in (("cmd_vel", Twist), ("next", String), ("verdict", String), ("places", PointCloud),
-                                                    ("diagnostics", DiagnosticArray))]
+                                                    ("diagnostics", DiagnosticArray), ("plan_pose", PoseWithCovarianceStamped),
+                                                    ("plan_places", PoseArray), ("plan_belief", PointCloud))]
             self.wait(lambda: self.publishers["image"].get_num_connections() > 0)
             self.wait(lambda: all(each.get_num_connections() > 0 for each in self.subscribers[1:3]))
             time.sleep(0.5)
@@ -277,6 +280,40 @@ class Node(unittest.TestCase):
             self.wait(lambda: self.said["diagnostics"])
             time.sleep(0.05)
             return {pair.key: pair.value for pair in self.said["diagnostics"][-1].status[0].values}
+
+        def drive_to(self, x, y, heading):
+            """Where the wheels have it now."""
+            message = Odometry()
+            message.header.stamp = self.stamp
+            message.pose.pose.position.x, message.pose.pose.position.y = x, y
+            message.pose.pose.orientation.z, message.pose.pose.orientation.w = numpy.sin(heading / 2), numpy.cos(heading / 2)
+            self.publishers["odom"].publish(message)
+            time.sleep(0.1)
+
+        def scan(self, ranges, is_answered=True, **others):
+            """Where it may be by a scan that was taken now: poses (x, y, heading) and probabilities."""
+            message = LaserScan(angle_min=-numpy.pi, angle_increment=numpy.radians(2), range_max=6, ranges=list(ranges), **others)
+            message.header.stamp = self.stamp
+            for topic in ("plan_places", "plan_belief", "plan_pose", "diagnostics"):
+                self.said[topic] = []
+            self.publishers["scan"].publish(message)
+            if not is_answered:
+                time.sleep(0.5)
+                self.test.assertEqual(self.said["plan_places"], [])
+                return None
+            self.wait(lambda: self.said["diagnostics"])
+            time.sleep(0.1)
+            return self.believed()
+
+        def believed(self):
+            places, belief = self.said["plan_places"][-1], self.said["plan_belief"][-1]
+            for message in (places, belief):
+                self.test.assertEqual((message.header.frame_id, message.header.stamp), ("map", self.stamp))
+            self.test.assertEqual([channel.name for channel in belief.channels], ["probability", "is_determined"])
+            poses = [(pose.position.x, pose.position.y, 2 * numpy.arctan2(pose.orientation.z, pose.orientation.w)) for pose in places.poses]
+            self.test.assertEqual(len(poses), len(belief.channels[0].values))
+            numpy.testing.assert_allclose([(point.x, point.y) for point in belief.points], numpy.array(poses)[:, :2], atol=1e-5)
+            return numpy.array(poses), numpy.array(belief.channels[0].values)
 
         def last_command(self):
             return self.said["cmd_vel"][-1].linear.x, self.said["cmd_vel"][-1].angular.z
@@ -464,6 +501,85 @@ class Node(unittest.TestCase):
             sense(0, (3, -7.5, 6.3))  # longer than gravity: nothing is known of up
             self.assertEqual(robot.show(picture, 0.5)["reason"], "none")
 
+    def laser_drive(self):
+        """tests/install/laser_room.h: motions of its wheels, and ranges."""
+        for line in (POSTER / "scans.txt").read_text().splitlines():
+            if not line.startswith("#"):
+                numbers = numpy.array(line.split(), float)
+                yield numbers[:3], numbers[3:]
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_is_found_on_the_floor_plan_by_laser_wheels_and_camera(self):
+        robot = self.Robot(self, "scanning", map="laser")
+        wheels, position = 2.0, numpy.array([7.0, -3.0])  # in a frame of their own
+        for number, (motion, ranges) in enumerate(self.laser_drive()):
+            c, s = numpy.cos(wheels), numpy.sin(wheels)
+            position = position + [c * motion[0] - s * motion[1], s * motion[0] + c * motion[1]]
+            wheels += motion[2]
+            robot.stamp += rospy.Duration(0.25)
+            robot.drive_to(*position, wheels)
+            poses, probabilities = robot.scan(ranges)
+            if number == 0:
+                numpy.testing.assert_allclose(poses[0], (-4, 0, 0.1), atol=0.05)
+        status = robot.said["diagnostics"][-1].status[0]
+        values = {pair.key: pair.value for pair in status.values}
+        self.assertIn("floor plan", status.name)
+        self.assertEqual((status.level, status.message, values["scans"]), (0, "sure", "6"))
+        self.assertAlmostEqual(sum(probabilities) + float(values["plan_elsewhere"]), 1, 2)
+        self.assertGreater(probabilities[0], 0.99)
+        self.assertAlmostEqual(poses[0][0], -2.8, delta=0.06)
+        self.assertAlmostEqual(poses[0][2], -0.1, delta=0.03)
+        pose = robot.said["plan_pose"][-1]
+        self.assertEqual((pose.header.frame_id, pose.header.stamp), ("map", robot.stamp))
+        self.assertAlmostEqual(pose.pose.pose.position.x, poses[0][0], 5)
+        covariance = numpy.array(pose.pose.covariance).reshape(6, 6)
+        numpy.testing.assert_allclose(covariance, covariance.T, atol=1e-15)
+        known = covariance[numpy.ix_([0, 1, 5], [0, 1, 5])]
+        self.assertGreater(numpy.linalg.eigvalsh(known)[0], 0)
+        self.assertLess(known[0, 0], 0.1 ** 2)
+        self.assertEqual(numpy.abs(covariance).sum(), numpy.abs(known).sum())  # no height, roll or pitch
+
+        # A laser that sees nothing says why, and changes nothing.
+        robot.stamp += rospy.Duration(0.25)
+        robot.drive_to(*position, wheels)
+        message = LaserScan(angle_min=-1, angle_increment=0.01, range_max=6, ranges=[numpy.inf] * 100)
+        message.header.stamp = robot.stamp
+        robot.said["diagnostics"] = []
+        robot.publishers["scan"].publish(message)
+        robot.wait(lambda: robot.said["diagnostics"])
+        status = robot.said["diagnostics"][-1].status[0]
+        self.assertEqual(status.level, 1)
+        self.assertIn("0 of 100 beams met something", status.message)
+        self.assertAlmostEqual(robot.believed()[0][0][0], poses[0][0], delta=0.01)
+
+        # An image counts, at its own time: from (-2.8, 0), where the robot turned to look along x.
+        self.assertGreater(poses[0][1], 0.05)
+        robot.stamp += rospy.Duration(0.25)
+        robot.drive_to(*position, wheels + 0.1)
+        robot.said["plan_places"] = []
+        robot.stamp -= rospy.Duration(0.25)  # show adds it
+        robot.show(read_pgm(POSTER / "room24.pgm"))
+        robot.wait(lambda: robot.said["plan_places"])
+        poses, probabilities = robot.believed()
+        numpy.testing.assert_allclose(poses[0], (-2.8, 0, 0), atol=0.04)
+        self.assertGreater(probabilities[0], 0.99)
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's room")
+    def test_a_laser_may_hang_upside_down_and_wheels_may_be_silent(self):
+        robot = self.Robot(self, "hanging", "_laser_in_robot:=[0.2, 0, 0.3, 1, 0, 0, 0]", map="laser")
+        _, ranges = next(self.laser_drive())
+        mirrored = [ranges[(180 - i) % 180] for i in range(180)]
+        poses, probabilities = robot.scan(mirrored)
+        numpy.testing.assert_allclose(poses[0], (-4 - 0.2 * numpy.cos(0.1), -0.2 * numpy.sin(0.1), 0.1), atol=0.05)
+        self.assertGreater(probabilities[0], 0.8)
+        robot.stamp += rospy.Duration(0.25)
+        robot.scan(mirrored, is_answered=False)  # everywhere, once a second
+        robot.stamp += rospy.Duration(1)
+        self.assertAlmostEqual(robot.scan(mirrored)[1][0], probabilities[0], 5)  # it knows no more than before
+        robot.stamp += rospy.Duration(1)
+        near = [value if value > 2 else 0.01 for value in mirrored]  # nearer than range_min
+        self.assertLess(numpy.hypot(*(robot.scan(near, range_min=0.02)[0][0][:2] - poses[0][:2])), 0.1)
+
     def test_bad_parameters_end_the_node_with_a_sentence(self):
         for number, (arguments, words, code) in enumerate(((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),
@@ -478,6 +594,11 @@ class Node(unittest.TestCase):
                                         "camera_turn_deg = 90", 2),
                                        ((f"_map:={MAP}", "_where:=true", "_where_period_s:=-1"), "where_period_s is -1", 2),
                                        ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2),
+                                       ((f"_map:={POSTER / 'laser.cairn'}", "_laser_in_robot:=[0, 0, 0, 0.7071068, 0, 0, 0.7071068]"),
+                                        "the laser is tilted by 90 degrees", 2),
+                                       ((f"_map:={MAP}", "_laser_in_robot:=[0, 0]"), "laser_in_robot has 2 numbers", 2),
+                                       ((f"_map:={POSTER / 'laser.cairn'}", "_laser_max_range_m:=-1"), "max_range_m = -1", 2),
+                                       ((f"_map:={MAP}", "_min_plan_probability:=1"), "min_plan_probability is 1", 2),
                                        ((f"_map:={MAP}", "_gravity:=true"), "set ~camera_in_robot", 2),
                                        ((f"_map:={MAP}", "_gravity:=true", LEVEL, "_gravity_sigma_deg:=0"), "gravity_sigma_deg is 0", 2),
                                        ((f"_map:={MAP}", "_gravity:=true", LEVEL, "_imu_in_robot:=[1]"), "imu_in_robot has 1 numbers", 2))):
