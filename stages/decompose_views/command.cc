@@ -54,7 +54,8 @@ void PrintChanges(const std::vector<PlanChange>& changes, std::ostream& out) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const InputPlan input, ReadPlan(arguments.plan));
+  CAIRN_ASSIGN_OR_RETURN(const InputPlan input, ReadPlan(arguments.plan, arguments.options.read));
+  for (const std::string& note : input.notes) *environment.out << "decompose_views: " << note << "\n";
   const Result<DecomposeViewsResult> result = DecomposeViews(
       input, arguments.options, environment.num_threads, environment.memory_mib, *environment.progress);
   if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.plan, result.error().message);
@@ -101,7 +102,8 @@ Command DecomposeViewsCommand() {
   command.summary = "Divide a floor plan into regions from which a laser sees the same walls";
   command.add_arguments = [arguments](ArgumentParser& parser) {
     parser
-        .Add("plan", arguments->plan, "floor plan in metres: GeoJSON polygons, or lines x0,y0,x1,y1 of walls")
+        .Add("plan", arguments->plan,
+             "floor plan: GeoJSON, DXF, the YAML file of a ROS map, or lines x0,y0,x1,y1 of walls")
         .Required()
         .Type("FILE");
     parser.Add("-o,--output", arguments->output, "regions to write (views.db)").Required().Type("FILE");

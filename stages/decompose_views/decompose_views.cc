@@ -27,7 +27,8 @@ InputPlan Placed(InputPlan plan, const DecomposeViewsOptions& options) {
 }  // namespace
 
 OptionTable DescribeOptions(DecomposeViewsOptions* o) {
-  return {
+  OptionTable table = DescribeOptions(&o->read);
+  const OptionTable more = {
       {.name = "plan_x_m",
        .value = &o->plan_x_m,
        .help = "place of the origin of the plan's file in the survey's floor frame, x in metres",
@@ -70,6 +71,8 @@ OptionTable DescribeOptions(DecomposeViewsOptions* o) {
        .min = 0,
        .max = 1e6},
   };
+  table.insert(table.end(), more.begin(), more.end());
+  return table;
 }
 
 Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,

@@ -18,6 +18,7 @@ namespace cairn::decompose_views {
 // (view-invariant regions, VIRs; core/view_regions/derive_views.h).  Before: a floor plan.  After:
 // localization with laser scans (runtime).  Implements [Simsarian96 §2.2].
 struct DecomposeViewsOptions {
+  ReadPlanOptions read;  // how the plan's file is read, before
   CleanPlanOptions clean;
   // Where the plan lies: its origin, and the direction of its x axis, counter-clockwise, in the frame of the
   // views (a survey's floor).  Regions, walls and lists of changes are in that frame.

@@ -179,8 +179,13 @@ TEST(CleanPlan, CoordinatesFarFromTheOriginLoseNothing) {
 }
 
 TEST(CleanPlan, RefusesWhatDoesNotFitTheGrid) {
-  EXPECT_EQ(ErrorOf("0,0,1e8,0").code, ErrorCode::kUnsupported);
-  EXPECT_THAT(ErrorOf("0,0,1e8,0").message, HasSubstr("--grid-m"));
+  NoProgress progress;
+  const auto input = ParsePlan("0,0,1e8,0", "plan", {.units = "m"});
+  ASSERT_TRUE(input.ok());
+  const auto result = CleanPlan(*input, {}, progress);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(result.error().message, HasSubstr("--grid-m"));
 }
 
 TEST(CleanPlan, RefusesInvalidPolygonsAndSaysWhere) {

@@ -78,6 +78,50 @@ TEST(ReadPlan, OfAPlanWithFreeSpaceNothingElseCounts) {
   EXPECT_EQ(num_rings(room + "," + other + "," + kind), 3u);
 }
 
+TEST(ReadPlan, LinesOfGeoJsonAreWalls) {
+  const auto open = ParsePlan(
+      "{\"type\": \"GeometryCollection\", \"geometries\": [{\"type\": \"LineString\", \"coordinates\": "
+      "[[0,0],[4,0,7],[4,3]]}, {\"type\": \"MultiLineString\", \"coordinates\": [[[1,1],[2,1]], "
+      "[[1,2],[2,2]]]}]}",
+      "plan");
+  ASSERT_TRUE(open.ok()) << open.error().message;
+  EXPECT_FALSE(open->closed());
+  ASSERT_EQ(open->segments.size(), 4u);
+  EXPECT_EQ(open->segments[1].start, Eigen::Vector2d(4, 0));
+  EXPECT_EQ(open->segments[1].end, Eigen::Vector2d(4, 3));
+  EXPECT_EQ(open->segments[1].line, 1);
+  EXPECT_EQ(open->segments[3].line, 3);
+  // With lines besides, a polygon's rings are walls.
+  const std::string square = "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[4,0],[4,4],[0,0]]]}",
+                    line = "{\"type\": \"LineString\", \"coordinates\": [[3,1],[3,2]]}";
+  const auto mixed =
+      ParsePlan("{\"type\": \"GeometryCollection\", \"geometries\": [" + square + "," + line + "]}", "plan");
+  ASSERT_TRUE(mixed.ok());
+  EXPECT_FALSE(mixed->closed());
+  ASSERT_EQ(mixed->segments.size(), 4u);
+  EXPECT_EQ(mixed->segments[2].end, Eigen::Vector2d(0, 0));
+  EXPECT_EQ(mixed->segments[3].line, 2);
+  EXPECT_EQ(mixed->notes.size(), 1u);
+  // Not where the free space is told from the rest.
+  const auto free_space = ParsePlan(
+      "{\"type\": \"FeatureCollection\", \"features\": [{\"type\": \"Feature\", \"properties\": {\"kind\": "
+      "\"free_space\"}, \"geometry\": " +
+          square + "}, {\"type\": \"Feature\", \"geometry\": " + line + "}]}",
+      "plan");
+  ASSERT_TRUE(free_space.ok());
+  EXPECT_TRUE(free_space->closed());
+  EXPECT_THAT(ErrorOf("{\"type\": \"LineString\", \"coordinates\": [[0,0]]}").message,
+              HasSubstr("line 1 has 1 points"));
+  EXPECT_THAT(ErrorOf("{\"type\": \"LineString\", \"coordinates\": [[0,0],[1]]}").message,
+              HasSubstr("line 1: point 2"));
+  EXPECT_EQ(ErrorOf("{\"type\": \"MultiLineString\", \"coordinates\": 1}").code, ErrorCode::kCorrupt);
+}
+
+TEST(ReadPlan, LayersAreForDrawings) {
+  EXPECT_THAT(ParsePlan("0,0,1,0", "plan", {.layers = "A"}).error().message, HasSubstr("layers"));
+  EXPECT_THAT(ParsePlan("{}", "plan", {.layers = "A"}).error().message, HasSubstr("layers"));
+}
+
 TEST(ReadPlan, RefusesWhatIsNoPolygon) {
   EXPECT_EQ(ErrorOf("{\"type\": \"Point\", \"coordinates\": [0, 0]}").code, ErrorCode::kUnsupported);
   EXPECT_EQ(ErrorOf("{ not json").code, ErrorCode::kCorrupt);

@@ -28,7 +28,7 @@ stages/filter_visibility
 stages/decompose_regions/cover stages/decompose_regions/algorithms stages/decompose_regions
 stages/build_vocabulary
 stages/link_appearance/dominating_set stages/link_appearance
-stages/decompose_views/plan stages/decompose_views
+stages/decompose_views/formats stages/decompose_views/plan stages/decompose_views
 stages/emit_map/previous stages/emit_map/choose stages/emit_map stages/emit_map/leave_out
 stages/check_map
 pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film

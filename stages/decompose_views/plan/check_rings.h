@@ -14,7 +14,4 @@ namespace cairn::decompose_views {
 // Errors: Corrupt: what is wrong and where, in metres.
 Status CheckRings(const std::vector<std::vector<Eigen::Vector2d>>& rings);
 
-// Twice the area of a ring, m^2; negative if it is clockwise.
-double TwiceArea(const std::vector<Eigen::Vector2d>& ring);
-
 }  // namespace cairn::decompose_views

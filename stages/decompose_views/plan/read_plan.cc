@@ -1,127 +1,21 @@
 #include "stages/decompose_views/plan/read_plan.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-
-#include <nlohmann/json.hpp>
+#include <filesystem>
+#include <utility>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
-#include "stages/decompose_views/plan/check_rings.h"
+#include "stages/decompose_views/formats/dxf_plan.h"
+#include "stages/decompose_views/formats/geojson_plan.h"
+#include "stages/decompose_views/formats/occupancy_grid.h"
 
 namespace cairn::decompose_views {
 namespace {
 
-using nlohmann::json;
-
-constexpr double kMaxCoordinateM = 1e9;
-constexpr int kMaxDepth = 32;
-
-class GeoJsonReader {
- public:
-  explicit GeoJsonReader(const std::string& what) : what_(what) {}
-
-  Status Read(const json& object, int depth = 0) {
-    if (depth > kMaxDepth) return Corrupt(what_, "collections in collections, more than {} deep", kMaxDepth);
-    const std::string type = object.is_object() ? object.value("type", json()).dump() : "";
-    if (type == "\"FeatureCollection\"") return ReadAll(object, "features", depth);
-    if (type == "\"GeometryCollection\"") return ReadAll(object, "geometries", depth);
-    if (type == "\"Feature\"") {
-      if (!object.contains("geometry")) return Corrupt(what_, "a Feature has no \"geometry\"");
-      return object["geometry"].is_null() ? Ok() : Read(object["geometry"], depth + 1);
-    }
-    if (type == "\"Polygon\"") return ReadPolygon(object.value("coordinates", json()));
-    if (type == "\"MultiPolygon\"") {
-      const json polygons = object.value("coordinates", json());
-      if (!polygons.is_array()) return Corrupt(what_, "a MultiPolygon has no list \"coordinates\"");
-      for (const json& polygon : polygons) CAIRN_RETURN_IF_ERROR(ReadPolygon(polygon));
-      return Ok();
-    }
-    return MakeError(ErrorCode::kUnsupported,
-                     "{}: a GeoJSON object of type {}; floor plans are Polygon or MultiPolygon (walls that "
-                     "enclose nothing: lines x0,y0,x1,y1)",
-                     what_, type.empty() ? "?" : type);
-  }
-
-  InputPlan plan;
-
- private:
-  Status ReadAll(const json& object, const char* member, int depth) {
-    const auto list = object.find(member);
-    if (list == object.end() || !list->is_array()) return Corrupt(what_, "no list \"{}\"", member);
-    const bool has_free_space = std::any_of(list->begin(), list->end(), IsFreeSpace);
-    for (const json& part : *list) {
-      if (!has_free_space || IsFreeSpace(part)) CAIRN_RETURN_IF_ERROR(Read(part, depth + 1));
-    }
-    return Ok();
-  }
-
-  // A plan may also contain furniture and rooms: those polygons are not the plan's walls.
-  static bool IsFreeSpace(const json& object) {
-    const auto properties = object.is_object() ? object.find("properties") : object.end();
-    if (!object.is_object() || properties == object.end() || !properties->is_object()) return false;
-    const auto kind = properties->find("kind");
-    return kind != properties->end() && kind->is_string() && *kind == "free_space";
-  }
-
-  Status ReadPolygon(const json& rings) {
-    if (!rings.is_array() || rings.empty()) return Corrupt(what_, "a Polygon has no list of rings");
-    for (size_t i = 0; i < rings.size(); ++i) CAIRN_RETURN_IF_ERROR(ReadRing(rings[i], i == 0));
-    return Ok();
-  }
-
-  Status ReadRing(const json& points, bool outer) {
-    const size_t number = plan.rings.size() + 1;
-    if (!points.is_array()) return Corrupt(what_, "ring {} is not a list of points", number);
-    std::vector<Eigen::Vector2d> ring;
-    for (const json& point : points) {
-      if (!point.is_array() || point.size() < 2 || !point[0].is_number() || !point[1].is_number()) {
-        return Corrupt(what_, "ring {}: point {} is not [x, y] in metres", number, ring.size() + 1);
-      }
-      const Eigen::Vector2d place(point[0].get<double>(), point[1].get<double>());
-      if (!(place.array().abs() <= kMaxCoordinateM).all()) {
-        return Corrupt(what_, "ring {}: point {} lies beyond {:g} m", number, ring.size() + 1,
-                       kMaxCoordinateM);
-      }
-      ring.push_back(place);
-    }
-    if (ring.size() < 4) {
-      return Corrupt(what_,
-                     "ring {} has {} points; a closed ring has at least 4, the last equal to the first",
-                     number, ring.size());
-    }
-    if (ring.front() != ring.back()) {
-      return Corrupt(
-          what_,
-          "ring {} is open: it begins at ({:g}, {:g}) and ends at ({:g}, {:g}); repeat the first point",
-          number, ring.front().x(), ring.front().y(), ring.back().x(), ring.back().y());
-    }
-    ring.pop_back();
-    if ((TwiceArea(ring) > 0) != outer) std::reverse(ring.begin(), ring.end());
-    plan.rings.push_back(std::move(ring));
-    return Ok();
-  }
-
-  const std::string& what_;
-};
-
-Result<InputPlan> ParseGeoJson(const std::string& text, const std::string& what) {
-  json document;
-  try {
-    document = json::parse(text);
-  } catch (const json::parse_error& error) {
-    if (error.byte > text.size())
-      return Corrupt(what, "JSON that ends too early, after {} bytes", text.size());
-    return Corrupt(what, "begins with '{{' but is not JSON: it goes wrong at byte {} of {}", error.byte,
-                   text.size());
-  } catch (const json::out_of_range&) {
-    return Corrupt(what, "a number in it is too large; expected metres up to {:g}", kMaxCoordinateM);
-  }
-  GeoJsonReader reader(what);
-  CAIRN_RETURN_IF_ERROR(reader.Read(document));
-  if (reader.plan.rings.empty()) return MakeError(ErrorCode::kNoData, "{}: no polygon in it", what);
-  return std::move(reader.plan);
-}
+constexpr uintmax_t kMaxFileBytes = uintmax_t{1} << 29;
 
 Result<InputPlan> ParseSegments(const std::string& text, const std::string& what) {
   InputPlan plan;
@@ -134,26 +28,157 @@ Result<InputPlan> ParseSegments(const std::string& text, const std::string& what
     const bool is_near =
         std::all_of(values.begin(), values.end(), [](double v) { return std::abs(v) <= kMaxCoordinateM; });
     if (values.size() != 4 || !is_near) {
-      return Corrupt(what, "line {}: {:?} is not x0,y0,x1,y1 in metres (four finite numbers up to {:g})",
-                     number, trimmed.substr(0, 80), kMaxCoordinateM);
+      return Corrupt(
+          what,
+          "line {}: {:?} is not x0,y0,x1,y1 in metres (four finite numbers up to {:g}); other plans are "
+          "GeoJSON, DXF, or the YAML file of a ROS map, named .yaml",
+          number, trimmed.substr(0, 80), kMaxCoordinateM);
     }
     plan.segments.push_back({{values[0], values[1]}, {values[2], values[3]}, number});
   }
   if (plan.segments.empty()) {
-    return MakeError(ErrorCode::kNoData, "{}: no walls in it; expected lines x0,y0,x1,y1 or GeoJSON", what);
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: no walls in it; expected lines x0,y0,x1,y1, GeoJSON, DXF, or the YAML file of a ROS map", what);
   }
   return plan;
 }
 
-}  // namespace
-
-Result<InputPlan> ParsePlan(const std::string& text, const std::string& what) {
-  return Trim(text).starts_with('{') ? ParseGeoJson(text, what) : ParseSegments(text, what);
+// What files that are often taken for plans are; empty: none of these.
+std::string KnownOtherKind(const std::string& text) {
+  const auto is_dwg = [&] {
+    return text.size() >= 6 && text.starts_with("AC10") &&
+           std::isdigit(static_cast<unsigned char>(text[4])) != 0;
+  };
+  if (text.starts_with("AutoCAD Binary DXF")) return "binary DXF, which is not read; save it as ASCII DXF";
+  if (is_dwg())
+    return "DWG, which is not read; save it as ASCII DXF, as with LibreCAD or ODA's File Converter";
+  if (text.starts_with("\x89PNG") || text.starts_with("P5") || text.starts_with("P2"))
+    return "an image, which does not say how large its cells are; name the map's YAML file that names it";
+  if (text.starts_with("%PDF")) return "PDF, which is not read; export DXF or GeoJSON";
+  if (text.starts_with("ISO-10303-21")) return "IFC (STEP), which is not read; export DXF";
+  return "";
 }
 
-Result<InputPlan> ReadPlan(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  return ParsePlan(text, path);
+bool IsOccupancyGrid(const std::string& path) {
+  const std::string suffix = std::filesystem::path(path).extension().string();
+  return suffix == ".yaml" || suffix == ".yml";
+}
+
+Status CheckReadOptions(const ReadPlanOptions& options) {
+  ReadPlanOptions checked = options;
+  return CheckOptions(DescribeOptions(&checked));
+}
+
+Error NoLayers(const std::string& what, const std::string& kind) {
+  return MakeError(ErrorCode::kInvalidArgument, "{}: layers: {} has none; leave the option out", what, kind);
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(ReadPlanOptions* o) {
+  return {
+      {.name = "units",
+       .value = &o->units,
+       .help = "unit of the plan's coordinates; auto: what a DXF says, else metres, refused where a building "
+               "cannot "
+               "have that size",
+       .choices = PlanUnits()},
+      {.name = "layers",
+       .value = &o->layers,
+       .help = "DXF: layers that have walls, between commas, with * and ? as in names of files; empty: all "
+               "that are "
+               "neither off nor frozen"},
+      {.name = "curve_tolerance_m",
+       .value = &o->curve_tolerance_m,
+       .help = "DXF: how far a chord that stands for a part of an arc may lie beside it, metres",
+       .min = 1e-4,
+       .max = 10},
+      {.name = "min_blob_m",
+       .value = &o->grid.min_blob_m,
+       .help = "ROS maps: groups of occupied cells that extend no farther than this are left out, and gaps "
+               "as small "
+               "within walls filled, metres",
+       .min = 0,
+       .max = 100},
+      {.name = "thin_wall_m",
+       .value = &o->grid.thin_wall_m,
+       .help = "ROS maps: walls up to this thick become one line in their middle, thicker ones their faces, "
+               "metres",
+       .min = 0,
+       .max = 10},
+      {.name = "trace_tolerance_cells",
+       .value = &o->grid.trace_tolerance_cells,
+       .help = "ROS maps: how far a wall's cells may lie beside its line, in cells",
+       .min = 0.5,
+       .max = 10},
+  };
+}
+
+Result<InputPlan> ParsePlan(const std::string& text, const std::string& what,
+                            const ReadPlanOptions& options) {
+  CAIRN_RETURN_IF_ERROR(CheckReadOptions(options));
+  if (const std::string kind = KnownOtherKind(text); !kind.empty())
+    return MakeError(ErrorCode::kUnsupported, "{}: {}", what, kind);
+  InputPlan plan;
+  UnitClaim claim;
+  const bool is_told = options.units != kUnitOfFile;
+  if (is_told) claim = {.unit = options.units, .is_given = true};
+  if (LooksLikeDxf(text)) {
+    CAIRN_ASSIGN_OR_RETURN(DxfPlan drawing,
+                           ParseDxf(text, what, {options.units, options.layers, options.curve_tolerance_m}));
+    plan = std::move(drawing.plan);
+    claim = drawing.claim;
+  } else if (Trim(text).starts_with('{')) {
+    if (!options.layers.empty()) return NoLayers(what, "GeoJSON");
+    CAIRN_ASSIGN_OR_RETURN(GeoJsonPlan geo, ParseGeoJson(text, what));
+    plan = std::move(geo.plan);
+    if (!is_told && !geo.crs_of_degrees.empty())
+      claim.degrees_by = fmt::format("\"crs\": {}", geo.crs_of_degrees.substr(0, 80));
+    ScalePlan(MetresOf(claim.unit), &plan);
+  } else {
+    if (!options.layers.empty()) return NoLayers(what, "a list of lines x0,y0,x1,y1");
+    CAIRN_ASSIGN_OR_RETURN(plan, ParseSegments(text, what));
+    ScalePlan(MetresOf(claim.unit), &plan);
+  }
+  CAIRN_RETURN_IF_ERROR(CheckPlanSize(plan, claim, what));
+  return plan;
+}
+
+Result<InputPlan> ReadPlan(const std::string& path, const ReadPlanOptions& options) {
+  if (!IsOccupancyGrid(path)) {
+    std::error_code error;
+    if (const uintmax_t num_bytes = std::filesystem::file_size(path, error);
+        !error && num_bytes > kMaxFileBytes) {
+      return MakeError(ErrorCode::kUnsupported,
+                       "{}: {} bytes, at most {} are read; divide the plan by buildings and floors", path,
+                       num_bytes, kMaxFileBytes);
+    }
+    CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+    return ParsePlan(text, path, options);
+  }
+  CAIRN_RETURN_IF_ERROR(CheckReadOptions(options));
+  if (!options.layers.empty()) return NoLayers(path, "a ROS map");
+  if (options.units != kUnitOfFile && options.units != "m") {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: units: a ROS map's resolution is in metres a cell; leave the option out", path);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const OccupancyGrid grid, ReadOccupancyGrid(path));
+  Result<std::vector<InputSegment>> walls = TraceGridWalls(grid, options.grid);
+  if (!walls.ok()) return MakeError(walls.error().code, "{}: {}", path, walls.error().message);
+  InputPlan plan;
+  plan.segments = std::move(*walls);
+  plan.notes.push_back(fmt::format("a ROS map of {} x {} cells of {:g} m: {} walls", grid.cells.cols,
+                                   grid.cells.rows, grid.resolution_m, plan.segments.size()));
+  return plan;
+}
+
+std::vector<std::string> OtherFilesOfPlan(const std::string& path) {
+  if (!IsOccupancyGrid(path)) return {};
+  const Result<std::string> image = ImageOfOccupancyGrid(path);
+  std::error_code error;
+  if (!image.ok() || !std::filesystem::is_regular_file(*image, error)) return {};
+  return {*image};
 }
 
 }  // namespace cairn::decompose_views
