@@ -11,6 +11,7 @@
 #include "core/capture/join_captures.h"
 #include "core/files/file.h"
 #include "pipeline/build/make_words.h"
+#include "stages/decompose_views/plan/read_plan.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -318,6 +319,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
   CAIRN_RETURN_IF_ERROR(config.Set("SESSIONS_REGISTERED", "", sessions.registered));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
+  CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN_FILES", "the image of the floor plan",
+                                   decompose_views::OtherFilesOfPlan(floor_plan)));
   CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
   CAIRN_RETURN_IF_ERROR(config.Set("PREVIOUS_MAP", "[emit_map] previous", {previous_map}));
   CAIRN_RETURN_IF_ERROR(config.Set("MODEL", "[extract_features] model", {model}));

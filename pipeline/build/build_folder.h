@@ -38,8 +38,9 @@ bool LeavesOut(const Recipe& recipe);
 //   options/program       hash of the program: another program redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES,
 //   SESSIONS_REGISTERED,
-//                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, LEFT_OUT, FLOOR_PLAN, NAME, SEED,
-//                         PROGRAM, VOCABULARY_TREE, PREVIOUS_MAP and MODEL for map.mk
+//                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, LEFT_OUT, FLOOR_PLAN,
+//                         FLOOR_PLAN_FILES, NAME, SEED, PROGRAM, VOCABULARY_TREE, PREVIOUS_MAP and MODEL for
+//                         map.mk
 //   recipe                path of the recipe, for people and for `cairn clean`; not part of a Makefile
 // Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names, with several captures), NotFound
 // (a file that [reconstruct] names), Io.

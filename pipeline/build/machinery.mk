@@ -22,7 +22,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 endif
 
 # Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SESSIONS_REGISTERED, SIMULATED, RECONSTRUCTED, REGISTERED, KNOWN_PLACES,
-# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, PREVIOUS_MAP, MODEL, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
+# QUERIES, LEFT_OUT, FLOOR_PLAN, FLOOR_PLAN_FILES, VOCABULARY_TREE, PREVIOUS_MAP, MODEL, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -33,6 +33,8 @@ endif
 # A file more, or less, in a folder that is a bag.
 CAIRN_VALUES = $(foreach pair,$($(1)),$(lastword $(subst =, ,$(pair))))
 $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(wildcard $(filter-out $(call CAIRN_VALUES,FOOTAGE_FILES),$(call CAIRN_VALUES,FOOTAGE))))
+# A floor plan that names its image may name another one.
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(if $(FLOOR_PLAN_FILES),$(wildcard $(FLOOR_PLAN))))
 # The map's path as the including Makefile spells it.
 MAP := $(CAIRN_MAP)
 endif

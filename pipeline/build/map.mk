@@ -144,7 +144,7 @@ $(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(BUILD
 
 # Stage 8: regions of the floor plan, where the recipe names one; that of a simulated capture is one of its files.
 ifneq ($(FLOOR_PLAN),)
-$(BUILD)/views.db.stamp: $(if $(filter yes,$(SIMULATED)),$(CAPTURE_STAMP),$(FLOOR_PLAN)) $(BUILD)/options/floor_plan \
+$(BUILD)/views.db.stamp: $(if $(filter yes,$(SIMULATED)),$(CAPTURE_STAMP),$(FLOOR_PLAN) $(FLOOR_PLAN_FILES)) $(BUILD)/options/floor_plan \
     $(call CAIRN_OPTIONS,decompose_views)
 	$(call CAIRN_RUN,decompose_views,plan decompose $(FLOOR_PLAN))
 endif

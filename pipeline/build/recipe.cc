@@ -40,7 +40,8 @@ constexpr Key kCaptureKeys[] = {
      "found from "
      "its images). Default \"shared\"."},
     {"floor_plan", "text",
-     "Floor plan of the place (GeoJSON polygons, or lines x0,y0,x1,y1 of walls; metres), relative to the "
+     "Floor plan of the place (GeoJSON, DXF, the YAML file of a ROS map, or lines x0,y0,x1,y1 of walls), "
+     "relative to the "
      "recipe: the map then has its walls, for robots with a laser ([floor plans](floor_plans.md)). One plan "
      "serves all "
      "captures. Default: none."},
