@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <numbers>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "bench/views/random_scan.h"
 #include "bench/views/scan_places.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -20,38 +19,9 @@
 namespace {
 
 using namespace cairn;
-using Vec2 = Eigen::Vector2d;
 
-constexpr int kNumPlaces = 60, kNumBeams = 180;
-constexpr double kNoiseM = 0.02, kMaxRangeM = 20;
-
-// A scan from a random place that sees at least three walls with half of its beams and stands 20 cm from
-// walls; nothing where this place is no such.
-std::optional<RangeScan> RandomScan(const FloorPlan& plan, const PlanRays& rays, Random* random) {
-  const Vec2 low = plan.Metres(plan.low), high = plan.Metres(plan.high);
-  RangeScan scan;
-  scan.first_angle_rad = -std::numbers::pi / 2;
-  scan.step_rad = std::numbers::pi / kNumBeams;
-  const double x = random->Uniform(low.x(), high.x());
-  const double y = random->Uniform(low.y(), high.y());
-  scan.pose = {{x, y}, random->Uniform(-std::numbers::pi, std::numbers::pi)};
-  std::vector<int32_t> walls;
-  for (int i = 0; i < kNumBeams; ++i) {
-    const double angle = scan.pose.heading_rad + scan.first_angle_rad + i * scan.step_rad;
-    const PlanRays::Hits hits = rays.Cast(scan.pose.position, {std::cos(angle), std::sin(angle)}, kMaxRangeM);
-    double range = 2 * kMaxRangeM;
-    if (hits.size > 0) {
-      walls.push_back(hits.at[0].wall);
-      range = hits.at[0].distance_m + random->Normal(0, kNoiseM);
-      if (range < 0.2) return std::nullopt;
-    }
-    scan.ranges_m.push_back(range);
-  }
-  if (std::ssize(walls) < kNumBeams / 2) return std::nullopt;
-  std::sort(walls.begin(), walls.end());
-  if (std::unique(walls.begin(), walls.end()) - walls.begin() < 3) return std::nullopt;
-  return scan;
-}
+constexpr int kNumPlaces = 60, kNumBeams = kNumRandomBeams;
+constexpr double kNoiseM = kRandomScanNoiseM;
 
 // Something in the way of 5 to 30 neighbouring beams, 0.3 to 2.3 m away, until a quarter of all are hidden.
 void HideAQuarter(RangeScan* scan, Random* random) {
