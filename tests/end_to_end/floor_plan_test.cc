@@ -129,6 +129,67 @@ TEST_F(FloorPlan, ARobotIsFollowedFromAnywhere) {
   EXPECT_EQ(json::parse(later.out.substr(0, later.out.find('\n')))["scan"], 4);
 }
 
+// The flat of SetUp as a ROS map of 5 cm a cell whose corner is at (-0.525, -0.525): walls lie on middles of
+// cells.
+void WriteRosMap(const std::string& folder, const std::string& name) {
+  constexpr int kColumns = 142, kRows = 102, kMargin = 10, kCellsOfMetre = 20;
+  std::string cells(kColumns * kRows, '\xfe');
+  const auto draw = [&](double x0, double y0, double x1, double y1) {
+    const auto cell = [&](double metres) {
+      return kMargin + static_cast<int>(std::lround(metres * kCellsOfMetre));
+    };
+    for (int y = cell(y0); y <= cell(y1); ++y) {
+      for (int x = cell(x0); x <= cell(x1); ++x)
+        cells[static_cast<size_t>((kRows - 1 - y) * kColumns + x)] = 0;
+    }
+  };
+  draw(0, 0, 6, 0);
+  draw(6, 0, 6, 4);
+  draw(0, 4, 6, 4);
+  draw(0, 0, 0, 4);
+  draw(3.5, 0, 3.5, 1.5);
+  draw(3.5, 2.5, 3.5, 4);
+  ASSERT_TRUE(WriteFileAtomically(folder + "/" + name + ".pgm",
+                                  fmt::format("P5\n{} {}\n255\n", kColumns, kRows) + cells)
+                  .ok());
+  ASSERT_TRUE(WriteFileAtomically(folder + "/" + name + ".yaml",
+                                  "image: " + name +
+                                      ".pgm\nresolution: 0.05\norigin: [-0.525, -0.525, 0]\nnegate: 0\n"
+                                      "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+                  .ok());
+}
+
+TEST_F(FloorPlan, ARosMapAndADrawingAreThePlanThatTheyShow) {
+  WriteRosMap(folder_.string(), "map");
+  const ProgramRun made = Run("plan decompose map.yaml -o map.db --svg map.svg");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("142 x 102 cells of 0.05 m: 6 walls"));
+  EXPECT_THAT(*ReadFile(Path("map.svg")), HasSubstr("</svg>"));
+  std::string drawing = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n";
+  std::istringstream lines(*ReadFile(Path("plan.txt")));
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<double> metres;
+    std::istringstream words(line);
+    for (std::string word; std::getline(words, word, ',');) metres.push_back(std::stod(word));
+    drawing += fmt::format("0\nLINE\n8\nWALLS\n10\n{}\n20\n{}\n11\n{}\n21\n{}\n", 1000 * metres[0],
+                           1000 * metres[1], 1000 * metres[2], 1000 * metres[3]);
+  }
+  ASSERT_TRUE(WriteFileAtomically(Path("plan.dxf"), drawing + "0\nENDSEC\n0\nEOF\n").ok());
+  const ProgramRun drawn = Run("plan decompose plan.dxf -o drawn.db --layers 'WALL*'");
+  ASSERT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_THAT(drawn.out, HasSubstr("walls by layer: WALLS 6"));
+  ASSERT_TRUE(
+      WriteFileAtomically(Path("scan.txt"), "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n").ok());
+  for (const char* views : {"map.db", "drawn.db"}) {
+    const ProgramRun located = Run(std::string("plan locate ") + views + " scan.txt");
+    ASSERT_EQ(located.exit_code, 0) << located.err;
+    const json found = json::parse(located.out)["solutions"][0];
+    EXPECT_NEAR(found["x"].get<double>(), 1, 0.02) << views;
+    EXPECT_NEAR(found["y"].get<double>(), 1, 0.02) << views;
+    EXPECT_NEAR(found["heading_deg"].get<double>(), 0, 0.5) << views;
+  }
+}
+
 TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
   ASSERT_TRUE(WriteFileAtomically(Path("twins.txt"),
                                   "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n"
@@ -196,6 +257,23 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   write("empty.txt", "");
   write("open.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}");
   write("crossing.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[2,2],[2,0],[0,2],[0,0]]]}");
+  write("degrees.json",
+        "{\"type\": \"LineString\", \"coordinates\": [[18.07,59.33],[18.0703,59.33],[18.0703,59.3301]]}");
+  write("millimetres.txt", "0,0,6000,0\n6000,0,6000,4000\n6000,4000,0,4000\n");
+  write("cut.dxf", "0\nSECTION\n2\nENTITIES\n0\nLINE\n8\nA\n10\n0\n");
+  write("nan.dxf", "0\nSECTION\n2\nENTITIES\n0\nLINE\n8\nA\n10\nnan\n0\nENDSEC\n0\nEOF\n");
+  write("drawing.dwg", std::string("AC1032\0\0", 8));
+  write("list.yaml", "- a\n- b\n");
+  write("away.yaml",
+        "image: ../a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: "
+        "0.65\nfree_thresh: 0.2\n");
+  write(
+      "zero.yaml",
+      "image: a.pgm\nresolution: 0\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n");
+  write("huge.yaml",
+        "image: huge.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: "
+        "0.2\n");
+  write("huge.pgm", "P5\n100000 100000\n255\n");
   write("one.txt", "1,-1,1,1\n");
   write("two.txt", "a.png\n\n");
   write("still.log", "FLASER 4 1 1 1 1 1 1 0 1 1 0 1 h 1\nFLASER 4 1 1 1 1 1 1 0 1 1 0 2 h 2\n");
@@ -226,6 +304,20 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan decompose open.json -o out.db", 4, "open"},
            Case{"plan decompose crossing.json -o out.db", 4, "Self-intersection"},
            Case{"plan decompose none.txt -o out.db", 3, "none.txt"},
+           Case{"plan decompose degrees.json -o out.db", 5, "EPSG:32634"},
+           Case{"plan decompose millimetres.txt -o out.db", 5, "mm: 6 m x 4 m"},
+           Case{"plan decompose plan.txt -o out.db --units mm", 5, "as units says"},
+           Case{"plan decompose plan.txt -o out.db --layers A", 2, "layers"},
+           Case{"plan decompose cut.dxf -o out.db", 4,
+                "cut.dxf: a DXF that is cut short: it ends after line 10"},
+           Case{"plan decompose nan.dxf -o out.db", 4, "nan.dxf: line 10: \"nan\""},
+           Case{"plan decompose drawing.dwg -o out.db", 5, "DWG"},
+           Case{"plan decompose list.yaml -o out.db", 4, "list.yaml"},
+           Case{"plan decompose none.yaml -o out.db", 3, "none.yaml"},
+           Case{"plan decompose away.yaml -o out.db", 2, "away.yaml: line 1: image \"../a.pgm\" leads out"},
+           Case{"plan decompose zero.yaml -o out.db", 4, "zero.yaml: line 2: resolution"},
+           Case{"plan decompose huge.yaml -o out.db", 5, "huge.pgm: 100000 x 100000 cells"},
+           Case{"plan decompose huge.pgm -o out.db", 5, "YAML"},
            Case{"plan decompose plan.txt -o out.db --grid-m 1", 2, "grid_m"},
            Case{"plan locate views.db one.txt --search vir", 6, "at least two"},
            Case{"plan locate plan.txt one.txt", 4, "plan.txt"},
@@ -379,14 +471,29 @@ TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
   EXPECT_EQ(refused.exit_code, static_cast<int>(ErrorCode::kGate)) << refused.err;
   EXPECT_THAT(refused.err, HasSubstr("does not fit the landmarks"));
 
+  // Of a ROS map, its image counts too.
+  WriteRosMap(folder_.string(), "site");
+  ASSERT_TRUE(WriteFileAtomically(
+                  Path("ros.toml"),
+                  "name = \"ros\"\n[[capture]]\npath = \"tiny.build/capture\"\nfloor_plan = \"site.yaml\"\n")
+                  .ok());
+  const std::string until = "compile ros.toml -o ros.cairn --until decompose-views --progress lines";
+  const ProgramRun ros = Run(until);
+  ASSERT_EQ(ros.exit_code, 0) << ros.err;
+  EXPECT_THAT(Run(until).err, Not(HasSubstr("views.db")));
+  std::string image = *ReadFile(Path("site.pgm"));
+  std::fill(image.end() - 142 * 40, image.end() - 142 * 30, '\0');
+  ASSERT_TRUE(WriteFileAtomically(Path("site.pgm"), image).ok());
+  EXPECT_THAT(Run(until).err, HasSubstr("views.db"));
+
   // Without one, the map is as small as before.
   ReplaceInFile(Path("tiny.toml"), "floor_plan = \"moved.geojson\"\n", "");
   ASSERT_EQ(Run("compile tiny.toml -o tiny.cairn").exit_code, 0);
   EXPECT_EQ(json::parse(Run("inspect tiny.cairn --json").out)["num_view_regions"], 0);
   EXPECT_EQ(Run("plan locate tiny.cairn scan.txt").exit_code, static_cast<int>(ErrorCode::kNotFound));
-  const ProgramRun until = Run("compile tiny.toml -o tiny.cairn --until decompose_views");
-  EXPECT_EQ(until.exit_code, 2);
-  EXPECT_THAT(until.err, HasSubstr("floor_plan = "));
+  const ProgramRun without = Run("compile tiny.toml -o tiny.cairn --until decompose_views");
+  EXPECT_EQ(without.exit_code, 2);
+  EXPECT_THAT(without.err, HasSubstr("floor_plan = "));
 }
 
 }  // namespace

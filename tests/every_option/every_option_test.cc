@@ -53,6 +53,8 @@ const std::map<std::string, std::vector<std::string>> kGiven = {
     {"reconstruct.rig_baselines", {"\"../rig.txt\""}},
     {"reconstruct.hold_out_every", {"4"}},
     {"filter_visibility.up", {"\"0,0,1\""}},
+    {"decompose_views.units", {"\"m\"", "\"mm\""}},
+    {"decompose_views.layers", {"\"WALLS\""}},  // of a drawing: DxfPlan.LayersAreChosenByName
     {"build_vocabulary.tree_from", {"\"words.db\""}},
     {"emit_map.max_bytes", {"400000"}},
     {"emit_map.previous", {"\"before.cairn\""}},
