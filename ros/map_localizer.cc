@@ -43,7 +43,7 @@ Result<std::shared_ptr<const Map>> OpenMap(const Parameters& parameters) {
                      parameters.memory_budget_mib);
   MapOptions options = {.memory_budget_bytes = int64_t{parameters.memory_budget_mib} << 20};
   if (!parameters.public_key.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(parameters.public_key));
+    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadTrustedKeys(parameters.public_key));
   }
   return Map::Open(parameters.map, options);
 }

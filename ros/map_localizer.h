@@ -15,8 +15,8 @@ namespace cairn_ros {
 struct Parameters {
   std::string map;              // path
   int memory_budget_mib = 256;  // limit for loaded parts of the map that are kept
-  std::string public_key;       // file of `cairn keygen`; maps that this key has not signed are refused
-  bool follow = true;           // from frame to frame; false: every image as if it were the first
+  std::string public_key;  // file of `cairn keygen` or `cairn keys`: maps that it does not trust are refused
+  bool follow = true;      // from frame to frame; false: every image as if it were the first
   // Where the camera's optical frame is mounted on the robot: x y z (m), qx qy qz qw; empty: the pose is
   // the camera's.
   std::vector<double> camera_in_robot;

@@ -257,13 +257,14 @@ Result<std::string> EncodeAtlas(const std::optional<SecretKey>& key, AtlasRows* 
     CAIRN_ASSIGN_OR_RETURN(atlas->signature, SignBytes(SignedHead(atlas->public_key, hash), *key));
   }
   BlobWriter writer;
-  writer.Bytes(SignedHead(atlas->public_key, hash));
+  atlas->payload_hash = hash;
+  writer.Bytes(SignedBytesOf(*atlas));
   writer.Bytes(atlas->signature.data(), atlas->signature.size());
   writer.Bytes(payload);
   return writer.Take();
 }
 
-Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<PublicKey>& required) {
+Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<KeyRing>& required) {
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   if (bytes.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: is empty, expected an atlas", path);
   const std::string_view magic = std::string_view(bytes).substr(0, kMagic.size());
@@ -276,7 +277,7 @@ Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<PublicK
   BlobReader reader(bytes);
   reader.Bytes(kMagic.size() + 1);
   AtlasRows atlas;
-  Hash hash;
+  Hash& hash = atlas.payload_hash;
   const auto read = [&](auto* field) {
     const std::string_view found = reader.Bytes(field->size());
     std::copy(found.begin(), found.end(), field->begin());
@@ -305,6 +306,25 @@ Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<PublicK
     return Corrupt(path, "{}; make it anew", checked.error().message);
   return atlas;
 }
+
+Status AddAtlasSignature(const std::string& path, const SecretKey& key, const std::string& signatures_path) {
+  CAIRN_ASSIGN_OR_RETURN(const PublicKey public_key, PublicKeyOf(key));
+  CAIRN_ASSIGN_OR_RETURN(const AtlasRows atlas, ReadAtlas(path, std::nullopt));
+  if (!atlas.is_signed()) {
+    return MakeError(
+        ErrorCode::kNotSigned,
+        "{}: is not signed, and signatures are added to one in the file; make it with `cairn atlas "
+        "--key`",
+        path);
+  }
+  if (atlas.public_key == public_key) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: has the signature of key {} already", path,
+                     HexOf(public_key));
+  }
+  return AddSignature(SignedBytesOf(atlas), key, signatures_path);
+}
+
+std::string SignedBytesOf(const AtlasRows& atlas) { return SignedHead(atlas.public_key, atlas.payload_hash); }
 
 bool IsAtlasFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

@@ -8,6 +8,7 @@
 
 #include "core/atlas/descriptor_code.h"
 #include "core/base/error.h"
+#include "core/seal/key_ring.h"
 #include "core/seal/signing_key.h"
 
 namespace cairn {
@@ -54,6 +55,7 @@ struct AtlasRows {
   uint64_t epoch = 0;  // as MapHead::epoch
   PublicKey public_key = {};
   Signature signature = {};
+  std::array<uint8_t, 32> payload_hash = {};  // of its file, once it was encoded or read
   CodeBook code_book;
   std::vector<AtlasMap> maps;
   std::vector<AtlasLookAlike> look_alikes;
@@ -71,10 +73,15 @@ inline constexpr int kMaxAtlasCodes = 1 << 22;
 // maps of one name, a cost that is negative or not finite); Corrupt (the key: PublicKeyOf).
 Result<std::string> EncodeAtlas(const std::optional<SecretKey>& key, AtlasRows* atlas);
 
-// Reads an atlas and checks every byte of it, and its signature: that of `required`, or, without it, of the
-// key that it names.  Errors: NotFound, Io, EmptyFile, Truncated, Corrupt, Unsupported (not an atlas, or of a
-// later format), NotSigned (required only), WrongKey.
-Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<PublicKey>& required);
+// Reads an atlas and checks every byte of it, and its signature: those of `required`, or, without it, of the
+// key that it names (CheckSignatureOf).  Errors: NotFound, Io, EmptyFile, Truncated, Corrupt, Unsupported
+// (not an atlas, or of a later format), NotSigned (required only), WrongKey.
+Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<KeyRing>& required);
+// The bytes that the signatures of an atlas cover.  REQUIRES: it was encoded or read.
+std::string SignedBytesOf(const AtlasRows& atlas);
+// Adds this key's signature of an atlas that is signed to a file of signatures; the atlas stays as it is.
+// Errors: as ReadAtlas and AddSignature; NotSigned; InvalidArgument (it has this key's already).
+Status AddAtlasSignature(const std::string& path, const SecretKey& key, const std::string& signatures_path);
 
 // Whether a file begins as an atlas does; false also where it cannot be read.
 bool IsAtlasFile(const std::string& path);

@@ -171,7 +171,7 @@ std::string EncodeMapDelta(const MapDelta& delta) {
   return writer.Take();
 }
 
-Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required) {
+Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<KeyRing>& required) {
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   if (bytes.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: is empty, expected a delta", path);
   const std::string_view magic = std::string_view(bytes).substr(0, kMagic.size());
@@ -214,8 +214,9 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
                      "or changed; copy it again",
                      path);
   }
-  CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(delta), delta.public_key, delta.signature, path, required,
-                                         "make it with `cairn update delta --key`"));
+  CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(delta), delta.public_key, delta.signature, path,
+                                         AnyKeyOf(required), "make it with `cairn update delta --key`",
+                                         SignatureList()));
   for (const auto& [num_bytes, page_size] : {std::pair(delta.old_num_bytes, delta.old_page_size),
                                              std::pair(delta.new_num_bytes, delta.new_page_size)}) {
     if (!IsPageSize(page_size) || num_bytes % page_size != 0 || num_bytes == 0 ||

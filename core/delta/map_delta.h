@@ -59,10 +59,11 @@ Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& ne
                               const std::optional<SecretKey>& key, bool allow_older = false);
 
 std::string EncodeMapDelta(const MapDelta& delta);
-// Reads a delta and checks every byte of it, and its signature: that of `required`, or, without it, of the
-// key that it names.  Errors: NotFound, Io, EmptyFile, Truncated, Corrupt, Unsupported
-// (not a delta, or of a later format), NotSigned (required only), WrongKey.
-Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required);
+// Reads a delta and checks every byte of it, and its signature: that of a key of `required`, or, without it,
+// of the key that it names.  One key is enough for any ring, since the delta makes nothing but the map that
+// it states, and that one needs as many as the ring wants.  Errors: NotFound, Io, EmptyFile, Truncated,
+// Corrupt, Unsupported (not a delta, or of a later format), NotSigned (required only), WrongKey.
+Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<KeyRing>& required);
 
 // The bytes of the new map, from those of the old one, which is read again from `old_path` where the delta
 // has rows.  Takes twice the memory of both, and that of the rows.  Errors: InvalidArgument (it is not the

@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "core/files/file_descriptor.h"
+#include "core/files/output_path.h"
 
 namespace cairn {
 
@@ -42,5 +44,16 @@ void FileLock::Share() {
 }
 
 void FileLock::Release() { flock(descriptor_, LOCK_UN); }
+
+Result<FileLock> LockFolderOf(const std::string& path) {
+  FileLock lock(open(FolderOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock.descriptor() < 0) {
+    return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}", path,
+                     std::strerror(errno));
+  }
+  if (lock.Try(FileLock::Kind::kExclusive) == FileLock::Claim::kHeld) return lock;
+  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is running in its folder; try again",
+                   path);
+}
 
 }  // namespace cairn

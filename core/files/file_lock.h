@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "core/base/error.h"
+
 namespace cairn {
 
 // Whether the file system of a file that can be read has locks of parts of files (fcntl), as SQLite wants
@@ -32,5 +34,9 @@ class FileLock {
  private:
   int descriptor_;
 };
+
+// Locks the folder of a file against others that replace files in it, for as long as the object lives.
+// Errors: Busy, NotFound, Io.
+Result<FileLock> LockFolderOf(const std::string& path);
 
 }  // namespace cairn

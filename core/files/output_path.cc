@@ -21,6 +21,13 @@ std::string FolderOf(const std::string& path) {
   return file.has_parent_path() ? file.parent_path().string() : ".";
 }
 
+std::string FileOf(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  const std::filesystem::path file = std::filesystem::canonical(path, error);
+  return error ? path : file.string();
+}
+
 Status CheckCanBeReplaced(const std::string& path) {
   if (path.empty()) return MakeError(ErrorCode::kInvalidArgument, "an output's path is empty");
   const std::string folder = FolderOf(path);

@@ -13,6 +13,9 @@ bool IsSameFile(const std::string& path1, const std::string& path2);
 // The folder that a file is in, or is to be in: "." where the path names none.
 std::string FolderOf(const std::string& path);
 
+// The file itself where a path is a link to it: what replaces a file that others read replaces that one.
+std::string FileOf(const std::string& path);
+
 // Whether a file can be written there by making a new one that takes its name: checked before long work, and
 // again when it is done.  Errors: InvalidArgument (no path), Io (no such folder, or a folder, a device or a
 // pipe is there), ReadOnly (the folder may not be written).

@@ -33,9 +33,9 @@ Status CheckAskedFor(const MapHead& head, const std::string& path, const std::st
                    head.name, head.epoch, min_epoch);
 }
 
-Result<uint64_t> EpochAfter(const std::string& previous_path, const std::string& name, const SecretKey& key) {
-  CAIRN_ASSIGN_OR_RETURN(const PublicKey public_key, PublicKeyOf(key));
-  CAIRN_ASSIGN_OR_RETURN(const MapFile previous, MapFile::Open(previous_path, {.public_key = public_key}));
+Result<uint64_t> EpochAfter(const std::string& previous_path, const std::string& name,
+                            const KeyRing& trusted) {
+  CAIRN_ASSIGN_OR_RETURN(const MapFile previous, MapFile::Open(previous_path, {.public_key = trusted}));
   CAIRN_RETURN_IF_ERROR(CheckAskedFor(previous.head(), previous_path, name, 0));
   if (previous.head().epoch < std::numeric_limits<uint64_t>::max()) return previous.head().epoch + 1;
   return MakeError(ErrorCode::kInvalidArgument,

@@ -23,8 +23,9 @@ Status CheckFollows(const MapHead& next, const std::string& next_path, const Map
 Status CheckAskedFor(const MapHead& head, const std::string& path, const std::string& name,
                      uint64_t min_epoch);
 
-// The epoch that a map needs to follow the one at `previous_path`, which this key has signed.  Errors: as
-// MapFile::Open with the key; OtherMap (not of this name); InvalidArgument (no epoch comes after it).
-Result<uint64_t> EpochAfter(const std::string& previous_path, const std::string& name, const SecretKey& key);
+// The epoch that a map needs to follow the one at `previous_path`, which these keys have signed.  Errors: as
+// MapFile::Open with the keys; OtherMap (not of this name); InvalidArgument (no epoch comes after it).
+Result<uint64_t> EpochAfter(const std::string& previous_path, const std::string& name,
+                            const KeyRing& trusted);
 
 }  // namespace cairn

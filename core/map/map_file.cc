@@ -126,7 +126,7 @@ Status MapFile::ReadHead(SQLite::Database& database, const MapFileOptions& optio
   CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path_, kMapVersionMajor));
   minor_version_ = database.execAndGet("PRAGMA user_version").getInt() % 1000;
   CAIRN_ASSIGN_OR_RETURN(seal_, ReadSeal(path_));
-  CAIRN_RETURN_IF_ERROR(CheckSignature(seal_, path_, options.public_key));
+  CAIRN_RETURN_IF_ERROR(CheckSignature(seal_, path_, options.public_key, options.signatures));
   CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path_, "blocks"));
   CAIRN_ASSIGN_OR_RETURN(const std::string entries, ReadDirectory(database, path_));
   CAIRN_ASSIGN_OR_RETURN(const StoredRows rows, ReadStoredRows(database, path_, HeadTables(), num_bytes_));

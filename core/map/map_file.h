@@ -16,8 +16,10 @@ class Database;
 namespace cairn {
 
 struct MapFileOptions {
-  // Maps without a signature of this key are refused.
-  std::optional<PublicKey> public_key;
+  // Maps without a signature of this key, or of enough keys of this ring, are refused.
+  std::optional<KeyRing> public_key;
+  // Signatures beside the seal's; none: those of SignaturesPath(path), where the seal's own does not suffice.
+  std::optional<SignatureList> signatures = {};
 };
 
 // A map file, open read-only and immutable: its head and its directory are read and checked against the seal,

@@ -79,4 +79,25 @@ Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const st
   return wanted;
 }
 
+Status AddMapSignature(const std::string& path, const SecretKey& key, const std::string& signatures_path) {
+  CAIRN_ASSIGN_OR_RETURN(const PublicKey public_key, PublicKeyOf(key));
+  CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(path, {}));
+  if (!map.seal().is_signed()) {
+    return MakeError(
+        ErrorCode::kNotSigned,
+        "{}: is not signed, and signatures are added to one in its seal, which sets its epoch; sign it "
+        "first with `cairn sign MAP --key KEY -o SIGNED`",
+        path);
+  }
+  if (map.seal().public_key == public_key) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: has the signature of key {} in its seal already", path,
+                     HexOf(public_key));
+  }
+  CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
+  CAIRN_ASSIGN_OR_RETURN(const Seal checked, ReadSeal(path));
+  if (checked.file != map.seal().file)
+    return MakeError(ErrorCode::kBusy, "{}: was changed while it was signed; sign it again", path);
+  return AddSignature(SignedBytesOf(checked), key, signatures_path);
+}
+
 }  // namespace cairn

@@ -31,9 +31,6 @@ crypto_generichash_state* StateOf(std::array<uint8_t, 384>* bytes) {
   return reinterpret_cast<crypto_generichash_state*>(bytes->data());
 }
 
-// The bytes that a signature covers.
-std::string SignedBytes(const Seal& seal) { return EncodeSeal(seal).substr(0, kSignedBytes); }
-
 // A map file open for its seal.
 class SealedFile {
  public:
@@ -188,7 +185,7 @@ Status SignFile(const std::string& path, const Hash& root, const SecretKey& key)
   Seal seal{.root = root};
   CAIRN_ASSIGN_OR_RETURN(seal.public_key, PublicKeyOf(key));
   CAIRN_ASSIGN_OR_RETURN(seal.file, file.HashFile(seal));
-  CAIRN_ASSIGN_OR_RETURN(seal.signature, SignBytes(SignedBytes(seal), key));
+  CAIRN_ASSIGN_OR_RETURN(seal.signature, SignBytes(SignedBytesOf(seal), key));
   return file.Write(seal);
 }
 
@@ -208,9 +205,12 @@ Status CheckFileHash(const std::string& path) {
       HexOf(found), HexOf(seal.file));
 }
 
-Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required) {
-  return CheckSignatureOf(SignedBytes(seal), seal.public_key, seal.signature, path, required,
-                          "sign it with `cairn sign`");
+std::string SignedBytesOf(const Seal& seal) { return EncodeSeal(seal).substr(0, kSignedBytes); }
+
+Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<KeyRing>& required,
+                      const std::optional<SignatureList>& others) {
+  return CheckSignatureOf(SignedBytesOf(seal), seal.public_key, seal.signature, path, required,
+                          "sign it with `cairn sign`", others);
 }
 
 }  // namespace cairn

@@ -8,6 +8,8 @@
 
 #include "core/base/error.h"
 #include "core/blocks/map_blocks.h"
+#include "core/seal/key_ring.h"
+#include "core/seal/signature_list.h"
 #include "core/seal/signing_key.h"
 
 namespace cairn {
@@ -57,9 +59,12 @@ Status SignFile(const std::string& path, const Hash& root, const SecretKey& key)
 Result<Seal> ReadSeal(const std::string& path);
 // Errors: Corrupt when the bytes of the file do not have the hash that its seal states.
 Status CheckFileHash(const std::string& path);
-// Whether the signature is by `required` or, without it, by the key in the seal.  Errors: NotSigned (required
-// only), WrongKey.
-Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required);
+// The bytes that a signature covers: magic, root and file.  Whoever signs them, they are the same.
+std::string SignedBytesOf(const Seal& seal);
+// Whether the signature is valid and, where keys are required, enough of them have signed, with `others` or
+// the signatures beside the file.  Errors: as CheckSignatureOf (core/seal/signature.h).
+Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<KeyRing>& required,
+                      const std::optional<SignatureList>& others = std::nullopt);
 
 // Writes a signed copy of a map, of this epoch; the old file stays.  Without an epoch: the map's own, or 1
 // where it has none.  Returns the epoch.  The copy is opened with the key before it is put in place; same
@@ -67,5 +72,11 @@ Status CheckSignature(const Seal& seal, const std::string& path, const std::opti
 // own hash is wrong: an unchecked map is not signed; or the key: PublicKeyOf); as Replacement::Finish.
 Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path,
                          std::optional<uint64_t> epoch = std::nullopt);
+
+// Adds this key's signature of a map that is signed to a file of signatures; the map stays as it is.  It is
+// checked first: every byte, as SignMap does.  Errors: as MapFile::Open, CheckFileHash and AddSignature;
+// NotSigned (the map has no signature in its seal); InvalidArgument (this key's is in its seal); Busy (it is
+// being replaced).
+Status AddMapSignature(const std::string& path, const SecretKey& key, const std::string& signatures_path);
 
 }  // namespace cairn

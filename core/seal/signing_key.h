@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "core/base/error.h"
 
@@ -35,6 +36,8 @@ Status WriteKeyPair(const KeyPair& keys, const std::string& path);
 Result<SecretKey> ReadSecretKey(const std::string& path);
 // Errors: NotFound; Io; InvalidArgument (not a regular file, or a secret key); Corrupt.
 Result<PublicKey> ReadPublicKey(const std::string& path);
+// The same of a file's text without white space at its end.
+Result<PublicKey> PublicKeyOfText(std::string_view text, const std::string& path);
 
 // The public key of a secret one, which follows from its seed.  Errors: Corrupt where the key states another
 // one: it is damaged, and anyone with a signature by each of the two could sign too.

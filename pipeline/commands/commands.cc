@@ -48,6 +48,11 @@ Command UpdateFamily() {
                 {DeltaCommand(), ApplyCommand(), RollbackCommand()});
 }
 
+Command KeysFamily() {
+  return Family("keys", "Rings of keys: several people sign, and a key that is lost or stolen is replaced",
+                {MakeKeysCommand(), SignKeysCommand(), ShowKeysCommand(), AcceptKeysCommand()});
+}
+
 }  // namespace
 
 std::vector<Command> AllCommands() {
@@ -59,7 +64,8 @@ std::vector<Command> AllCommands() {
        {InspectCommand(), check_map::CheckMapCommand(), ReportCommand(), DiffCommand(), ExportCommand()}},
       {"Where a robot is",
        {LocalizeCommand(), WhereCommand(), AtlasCommand(), PlanFamily(), RouteCommand(), DriveCommand()}},
-      {"Releases", {VerifyCommand(), KeygenCommand(), SignCommand(), UpdateFamily(), MigrateCommand()}},
+      {"Releases",
+       {VerifyCommand(), KeygenCommand(), KeysFamily(), SignCommand(), UpdateFamily(), MigrateCommand()}},
       {"", {ManualCommand()}},
   };
   std::vector<Command> commands;

@@ -58,18 +58,28 @@ Command RouteCommand();
 // cairn drive: a lost robot goes to a survey image in a simulated building
 Command DriveCommand();
 
-// cairn verify MAP [--public-key KEY.pub] [--name NAME] [--min-epoch N]
+// cairn verify MAP [--public-key KEY.pub|RING] [--name NAME] [--min-epoch N]
 Command VerifyCommand();
 // cairn keygen KEY
 Command KeygenCommand();
-// cairn sign MAP --key KEY -o SIGNED [--epoch N | --after PREVIOUS]
+// cairn keys make NAME=KEY.pub... --threshold K [--after RING] -o RING
+Command MakeKeysCommand();
+// cairn keys sign RING --key KEY
+Command SignKeysCommand();
+// cairn keys show RING [--after RING]
+Command ShowKeysCommand();
+// cairn keys accept RING NEXT...
+Command AcceptKeysCommand();
+// cairn sign MAP --key KEY -o SIGNED [--epoch N | --after PREVIOUS [--public-key KEY.pub|RING]]
+// cairn sign MAP --key KEY --add [-o SIGNATURES]
 Command SignCommand();
 // cairn update delta OLD NEW -o D [--key KEY] [--allow-older]
 Command DeltaCommand();
-// cairn update apply OLD D -o NEW [--public-key KEY.pub] [--name NAME] [--min-epoch N] [--allow-older]
+// cairn update apply OLD D -o NEW [--public-key KEY.pub|RING] [--name NAME] [--min-epoch N] [--allow-older]
+// [--signatures FILE]
 // cairn update apply MAP D --in-place, likewise
 Command ApplyCommand();
-// cairn update rollback MAP [--public-key KEY.pub] [--name NAME] [--min-epoch N]
+// cairn update rollback MAP [--public-key KEY.pub|RING] [--name NAME] [--min-epoch N]
 Command RollbackCommand();
 // cairn migrate OLD -o NEW
 Command MigrateCommand();

@@ -11,7 +11,10 @@
 #include "core/delta/map_delta.h"
 #include "core/delta/renumbering.h"
 #include "core/files/file.h"
+#include "core/files/output_path.h"
 #include "core/map/map_file.h"
+#include "core/seal/map_seal.h"
+#include "core/seal/signature_list.h"
 #include "runtime/map/update_map.h"
 
 namespace cairn::pipeline {
@@ -22,6 +25,7 @@ struct DeltaArguments {
   std::string new_path;
   std::string delta_path;
   std::string key_path;
+  std::string signatures_path;
   std::string name;
   uint64_t min_epoch = 0;
   bool allow_older = false;
@@ -57,16 +61,29 @@ Status MakeDelta(const DeltaArguments& arguments, const CommandEnvironment& envi
       arguments.new_path, delta.new_num_bytes, std::count(origins.begin(), origins.end(), Renumbering::kNew),
       origins.size(), num_blocks - NumSharedBlocks(new_map, old_map), num_blocks, arguments.old_path,
       delta.is_signed() ? "" : "; not signed");
+  // What other keys have signed goes with it: whoever sees the delta has its signatures.
+  CAIRN_ASSIGN_OR_RETURN(const SignatureList beside,
+                         ReadSignaturesIfThere(SignaturesPath(FileOf(arguments.new_path))));
+  const SignatureList signatures = ValidSignatures(SignedBytesOf(new_map.seal()), beside);
+  const std::string signatures_path = SignaturesPath(arguments.delta_path);
+  if (!signatures.empty())
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(signatures_path, EncodeSignatures(signatures)));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.delta_path, bytes));
   *environment.out << told;
+  if (!signatures.empty()) {
+    *environment.out << fmt::format("{}: {} more signatures of {}; send it with the delta\n", signatures_path,
+                                    signatures.size(), arguments.new_path);
+  }
   return Ok();
 }
 
 Result<UpdateOptions> ReadUpdateOptions(const DeltaArguments& arguments) {
-  UpdateOptions options = {
-      .allow_older = arguments.allow_older, .name = arguments.name, .min_epoch = arguments.min_epoch};
+  UpdateOptions options = {.allow_older = arguments.allow_older,
+                           .name = arguments.name,
+                           .min_epoch = arguments.min_epoch,
+                           .signatures = arguments.signatures_path};
   if (!arguments.key_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
+    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadTrustedKeys(arguments.key_path));
   }
   return options;
 }
@@ -99,7 +116,7 @@ Status Rollback(const DeltaArguments& arguments, const CommandEnvironment& envir
 }
 
 void AddDemands(ArgumentParser& parser, DeltaArguments* arguments, const char* key_help) {
-  parser.Add("--public-key", arguments->key_path, key_help).Type("KEY.pub");
+  parser.Add("--public-key", arguments->key_path, key_help).Type("KEY.pub|RING");
   parser.Add("--name", arguments->name, "Name that the replacing map must have").Type("NAME");
   parser.Add("--min-epoch", arguments->min_epoch, "Smallest epoch that the replacing map may have")
       .Type("N")
@@ -146,7 +163,14 @@ Command ApplyCommand() {
                            "Replace OLD in one step and keep it as OLD.previous, for cairn update rollback");
             parser.AddFlag("--allow-older", arguments->allow_older,
                            "Let a map of an earlier or the same epoch replace a signed map");
-            AddDemands(parser, arguments.get(), "Key whose signature the delta and the new map must have");
+            AddDemands(
+                parser, arguments.get(),
+                "Key whose signature the delta and the new map must have, or ring of the keys that may sign "
+                "them");
+            parser
+                .Add("--signatures", arguments->signatures_path,
+                     "More signatures of the new map [D.signatures, where it is there]")
+                .Type("FILE");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Apply(*arguments, environment); },
       .may_be_output = {"old", "--name"},  // Apply has its own message where these are the output
@@ -163,7 +187,9 @@ Command RollbackCommand() {
             parser.Add("map", arguments->old_path, "Map; MAP.previous takes its place")
                 .Required()
                 .Type("MAP");
-            AddDemands(parser, arguments.get(), "Key whose signature the previous map must have");
+            AddDemands(
+                parser, arguments.get(),
+                "Key whose signature the previous map must have, or ring of the keys that may sign it");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Rollback(*arguments, environment); },
   };

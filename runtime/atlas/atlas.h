@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/seal/signing_key.h"
+#include "core/seal/key_ring.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
@@ -22,8 +22,9 @@ struct AtlasOptions {
   int64_t memory_budget_bytes = int64_t{128} << 20;
   // Most maps that are kept open, each a file.  REQUIRES: >= 1
   int max_num_open_maps = 128;
-  // An atlas without a signature of this key is refused.  Its maps need none: the atlas states their hashes.
-  std::optional<PublicKey> public_key;
+  // An atlas without a signature of this key, or of enough keys of this ring, is refused (MapOptions).  Its
+  // maps need none: the atlas states their hashes.
+  std::optional<KeyRing> public_key;
   // Required name of the atlas (empty: any) and its smallest epoch (0: any).
   std::string name = {};
   uint64_t min_epoch = 0;

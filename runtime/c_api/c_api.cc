@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/features/features.h"
+#include "core/seal/accept_key_ring.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
 #include "runtime/c_api/logs.h"
@@ -100,6 +101,15 @@ int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* optio
     if (map_path == nullptr) return Misuse("map_path is NULL");
     CAIRN_ASSIGN_OR_RETURN(const GivenOptions given, OptionsOf(options));
     return RollBackMap(map_path, given.update);
+  });
+}
+
+int32_t cairn_key_ring_accept(const char* ring_path, const char* next_path, uint64_t* version) {
+  return Call("cairn_key_ring_accept", [&]() -> Status {
+    if (ring_path == nullptr || next_path == nullptr) return Misuse("ring_path or next_path is NULL");
+    CAIRN_ASSIGN_OR_RETURN(const KeyRing ring, AcceptKeyRings(ring_path, {next_path}));
+    if (version != nullptr) *version = ring.version;
+    return Ok();
   });
 }
 

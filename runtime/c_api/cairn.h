@@ -131,9 +131,14 @@ typedef struct cairn_map_options {
   uint64_t min_epoch;  /* maps of an earlier epoch are refused (CAIRN_NOT_NEWER); 0: any */
   int32_t allow_older; /* 1: cairn_map_update takes an earlier or the same epoch, too; never another map */
   int32_t reserved;    /* 0 */
+  /* In place of public_key: file of a ring of keys (`cairn keys make`) or of a public key.  Maps that fewer
+   * keys of the ring have signed than it wants are refused (CAIRN_NOT_SIGNED, CAIRN_WRONG_KEY). */
+  const char* key_ring;
+  /* cairn_map_update: file with more signatures of the new map; NULL or "": DELTA.signatures, if there. */
+  const char* signatures;
 } cairn_map_options;
 #define CAIRN_MAP_OPTIONS_INIT \
-  { sizeof(cairn_map_options), 0, NULL, NULL, 0, 0, 0 }
+  { sizeof(cairn_map_options), 0, NULL, NULL, 0, 0, 0, NULL, NULL }
 
 /* What a map says about itself. */
 typedef struct cairn_map_description {
@@ -732,6 +737,12 @@ CAIRN_API int32_t cairn_map_update(const char* map_path, const char* delta_path,
 /* Exchanges the map and the one before the last update; a second call exchanges them back.  min_epoch holds
  * here too; allow_older is ignored. */
 CAIRN_API int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options);
+/* Replaces a robot's ring of keys by the one after it (`cairn keys make --after`), whose signatures are
+ * beside it in NEXT.signatures: enough keys of either ring must have signed it.  At any instant the file at
+ * `ring_path` is the whole old or the whole new ring.  *version (may be NULL): of the ring that is then in
+ * place; a ring that is there already is no error.  CAIRN_NOT_NEWER: an earlier version, or one that leaves
+ * out others; CAIRN_NOT_SIGNED, CAIRN_WRONG_KEY: too few signatures, or none; CAIRN_BUSY. */
+CAIRN_API int32_t cairn_key_ring_accept(const char* ring_path, const char* next_path, uint64_t* version);
 
 #ifdef __cplusplus
 } /* extern "C" */

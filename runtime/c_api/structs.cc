@@ -51,8 +51,14 @@ Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
     return Misuse("options->memory_budget_bytes is {}; must not be negative", asked.memory_budget_bytes);
   if (asked.memory_budget_bytes > 0) given.map.memory_budget_bytes = asked.memory_budget_bytes;
   if (asked.public_key != nullptr) {
-    PublicKey& key = given.map.public_key.emplace();
+    PublicKey key;
     std::copy_n(asked.public_key, key.size(), key.begin());
+    given.map.public_key = key;
+  }
+  if (asked.key_ring != nullptr && asked.key_ring[0] != '\0') {
+    if (asked.public_key != nullptr)
+      return Misuse("options has a public_key and a key_ring; give one of them");
+    CAIRN_ASSIGN_OR_RETURN(given.map.public_key, ReadTrustedKeys(asked.key_ring));
   }
   if (asked.name != nullptr) given.map.name = asked.name;
   given.map.min_epoch = asked.min_epoch;
@@ -61,7 +67,8 @@ Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
   given.update = {.public_key = given.map.public_key,
                   .allow_older = asked.allow_older == 1,
                   .name = given.map.name,
-                  .min_epoch = given.map.min_epoch};
+                  .min_epoch = given.map.min_epoch,
+                  .signatures = asked.signatures == nullptr ? "" : asked.signatures};
   return given;
 }
 

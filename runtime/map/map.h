@@ -12,7 +12,7 @@
 #include "core/base/ids.h"
 #include "core/blocks/map_head.h"
 #include "core/camera/camera.h"
-#include "core/seal/signing_key.h"
+#include "core/seal/key_ring.h"
 
 namespace cairn {
 
@@ -41,8 +41,10 @@ struct MapOptions {
   // Largest size of the loaded parts of a map that are kept for later queries.  The parts that a query is
   // using come on top.
   int64_t memory_budget_bytes = int64_t{256} << 20;
-  // Maps without a signature of this key are refused.
-  std::optional<PublicKey> public_key;
+  // Maps that this key has not signed are refused; or those that fewer keys of this ring have signed than it
+  // wants (core/seal/key_ring.h; ReadTrustedKeys reads either).  Signatures besides the map's own are in the
+  // file MAP.signatures.
+  std::optional<KeyRing> public_key;
   // Required name of the map (empty: any) and its smallest epoch (0: any): a map of this site, not older than
   // the robot's last one.  They can be trusted only with a key: without one, anybody can write a map that
   // says so.

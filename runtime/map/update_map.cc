@@ -5,9 +5,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "core/base/no_throw.h"
 #include "core/delta/map_delta.h"
@@ -20,31 +21,12 @@
 #include "core/files/write_error.h"
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
+#include "core/seal/signature_list.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Locks the folder of a map against other updates and rollbacks, for as long as the object lives.  Errors:
-// Busy, NotFound, Io.
-Result<FileLock> LockFolderOf(const std::string& map_path) {
-  FileLock lock(open(FolderOf(map_path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (lock.descriptor() < 0) {
-    return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}", map_path,
-                     std::strerror(errno));
-  }
-  if (lock.Try(FileLock::Kind::kExclusive) == FileLock::Claim::kHeld) return lock;
-  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is running in its folder; try again",
-                   map_path);
-}
-
-// The file itself where the path is a link to it: others read that file.
-std::string FileOf(const std::string& map_path) {
-  std::error_code error;
-  const fs::path file = fs::canonical(map_path, error);
-  return error ? map_path : file.string();
-}
 
 // Removes what killed updates have left beside a map.  REQUIRES: LockFolderOf(map_path)
 void RemoveStale(const std::string& map_path) {
@@ -52,17 +34,19 @@ void RemoveStale(const std::string& map_path) {
   const fs::path map(map_path);
   for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(map_path), error)) {
     const std::string name = entry.path().filename().string();
-    for (const std::string& target : {map.filename().string(), PreviousMapPath(map.filename().string())}) {
+    const std::string file = map.filename().string();
+    for (const std::string& target : {file, PreviousMapPath(file), SignaturesPath(file)}) {
       if (IsTemporaryName(name, target)) fs::remove(entry.path(), error);
     }
   }
 }
 
-// Whether `next` may follow the map at `old_path`.
+// Whether `next` may follow the map at `old_path`, which has these signatures besides its seal's.
 Status CheckMayFollow(const MapFile& next, const std::string& next_name, const std::string& old_path,
-                      const UpdateOptions& options) {
+                      const SignatureList& old_signatures, const UpdateOptions& options) {
   CAIRN_RETURN_IF_ERROR(CheckAskedFor(next.head(), next_name, options.name, options.min_epoch));
-  const Result<MapFile> old = MapFile::Open(old_path, {.public_key = options.public_key});
+  const Result<MapFile> old =
+      MapFile::Open(old_path, {.public_key = options.public_key, .signatures = old_signatures});
   if (!old.ok()) {
     const ErrorCode code = old.error().code;
     if (code == ErrorCode::kNotSigned || code == ErrorCode::kWrongKey) return Ok();
@@ -72,20 +56,90 @@ Status CheckMayFollow(const MapFile& next, const std::string& next_name, const s
   return CheckFollows(next.head(), next_name, old->head(), old_path, options.allow_older);
 }
 
+// A file of signatures beside a map that cannot be read counts as none: it is no reason to keep the map, and
+// the new one's take its place.
+SignatureList ReadableSignatures(const std::string& path) {
+  const Result<SignatureList> signatures = ReadSignatures(path);
+  return signatures.ok() ? *signatures : SignatureList();
+}
+
+SignatureList SignaturesBeside(const std::string& map_path) {
+  return ReadableSignatures(SignaturesPath(FileOf(map_path)));
+}
+
+// Those that come with a delta.
+Result<SignatureList> SignaturesOf(const std::string& delta_path, const UpdateOptions& options) {
+  if (!options.signatures.empty()) return ReadSignatures(options.signatures);
+  return ReadSignaturesIfThere(SignaturesPath(delta_path));
+}
+
+SignatureList Union(SignatureList signatures, const SignatureList& more) {
+  signatures.insert(signatures.end(), more.begin(), more.end());
+  std::sort(signatures.begin(), signatures.end());
+  signatures.erase(std::unique(signatures.begin(), signatures.end()), signatures.end());
+  return signatures;
+}
+
+// A file that will become a map, and what its seal says.
+struct NextMap {
+  Replacement file;
+  Seal seal;
+};
+
 // Writes the file that will become `path`: a map made by a delta from the one at `old_path`.  It is opened as
 // a robot would: a map that robots would refuse must not replace one that they can open.
-Result<Replacement> WriteMap(const std::string& bytes, const std::string& path, const std::string& old_path,
-                             const std::string& delta_path, const UpdateOptions& options) {
+Result<NextMap> WriteMap(const std::string& bytes, const std::string& path, const std::string& old_path,
+                         const std::string& delta_path, const SignatureList& signatures,
+                         const UpdateOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
   CAIRN_RETURN_IF_ERROR(file.Write(bytes));
-  const Result<MapFile> map = MapFile::Open(file.temporary(), {.public_key = options.public_key});
+  const SignatureList beside = SignaturesBeside(old_path);
+  const Result<MapFile> map = MapFile::Open(
+      file.temporary(), {.public_key = options.public_key, .signatures = Union(signatures, beside)});
   if (!map.ok()) {
     return MakeError(map.error().code, "{}: leads to a map that cannot be opened: {}", delta_path,
                      map.error().message);
   }
-  CAIRN_RETURN_IF_ERROR(
-      CheckMayFollow(*map, fmt::format("{}: the map that it leads to", delta_path), old_path, options));
-  return file;
+  CAIRN_RETURN_IF_ERROR(CheckMayFollow(*map, fmt::format("{}: the map that it leads to", delta_path),
+                                       old_path, beside, options));
+  return NextMap{std::move(file), map->seal()};
+}
+
+// Puts the signatures of the next map, those of `candidates` that are valid, beside the map at `map_path`,
+// where those of the maps that are there stay.  It is done before the next map is put in place, and there is
+// nothing to be done after that.  So whenever a robot stops:
+// - before the file of signatures is renamed, the old map has its signatures, as ever;
+// - between the two renames, the file has those of the old map, of the one before it and of the next one:
+// more
+//   than are needed;
+// - after the map is renamed, the same file has those of the new map and of the old one, which is .previous
+//   now, so that to go back is one exchange.
+// Signatures of other maps prove nothing about the one in place: a reader passes over them.  A reader that
+// has opened the map just before it was renamed finds its signatures afterwards, too.
+Status KeepSignatures(const Seal& next, const SignatureList& candidates, const std::string& map_path) {
+  const std::string path = SignaturesPath(map_path);
+  const SignatureList beside = ReadableSignatures(path);
+  SignatureList kept = ValidSignatures(SignedBytesOf(next), Union(candidates, beside));
+  if (std::includes(beside.begin(), beside.end(), kept.begin(), kept.end())) return Ok();
+  for (const std::string& there : {map_path, PreviousMapPath(map_path)}) {
+    const Result<Seal> seal = ReadSeal(there);
+    if (seal.ok()) kept = Union(std::move(kept), ValidSignatures(SignedBytesOf(*seal), beside));
+  }
+  if (kept.size() > kMaxSignatures) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: would have {} signatures, at most {}; send only those of the keys that are trusted",
+                     path, kept.size(), kMaxSignatures);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
+  CAIRN_RETURN_IF_ERROR(file.Write(EncodeSignatures(kept)));
+  // Whoever may read the map may read its signatures.
+  struct stat map = {};
+  if (stat(map_path.c_str(), &map) == 0) {
+    const FileDescriptor descriptor(open(file.temporary().c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+    if (descriptor.get() < 0) return WriteError(path, "cannot be written", errno);
+    CAIRN_RETURN_IF_ERROR(GiveAttributes(descriptor.get(), map, path));
+  }
+  return file.Finish();
 }
 
 int Exchange(const std::string& path1, const std::string& path2) {
@@ -188,10 +242,12 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
     }
     CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(new_path, {delta_path}));
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
+    CAIRN_ASSIGN_OR_RETURN(const SignatureList given, SignaturesOf(delta_path, options));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
-    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, new_path, old_path, delta_path, options));
-    return file.Finish();
+    CAIRN_ASSIGN_OR_RETURN(NextMap next, WriteMap(bytes, new_path, old_path, delta_path, given, options));
+    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, Union(given, SignaturesBeside(old_path)), new_path));
+    return next.file.Finish();
   });
 }
 
@@ -203,19 +259,25 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
     CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
     RemoveStale(map_path);
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
+    CAIRN_ASSIGN_OR_RETURN(const SignatureList given, SignaturesOf(delta_path, options));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
     if (HashOf(old_bytes) == delta.new_hash) {
-      CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(map_path, {.public_key = options.public_key}));
+      CAIRN_ASSIGN_OR_RETURN(
+          const MapFile map,
+          MapFile::Open(map_path, {.public_key = options.public_key,
+                                   .signatures = Union(given, SignaturesBeside(map_path))}));
       CAIRN_RETURN_IF_ERROR(CheckAskedFor(map.head(), map_path, options.name, options.min_epoch));
+      CAIRN_RETURN_IF_ERROR(KeepSignatures(map.seal(), given, map_path));
       CAIRN_RETURN_IF_ERROR(SyncFolderOf(map_path, lock.descriptor()));
       return false;
     }
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, map_path, delta_path));
-    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, map_path, map_path, delta_path, options));
+    CAIRN_ASSIGN_OR_RETURN(NextMap next, WriteMap(bytes, map_path, map_path, delta_path, given, options));
+    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, given, map_path));
     KeptMap previous(map_path, lock.descriptor());
     CAIRN_RETURN_IF_ERROR(previous.Keep());
-    const Status status = file.Finish();
-    if (file.is_in_place()) previous.Confirm();
+    const Status status = next.file.Finish();
+    if (next.file.is_in_place()) previous.Confirm();
     if (!status.ok()) return status.error();
     return true;
   });

@@ -32,9 +32,10 @@ struct PyAtlas {
 };
 
 PyAtlas OpenAtlas(const py::object& path, const std::optional<py::bytes>& public_key, const std::string& name,
-                  uint64_t min_epoch) {
+                  uint64_t min_epoch, const py::object& key_ring) {
   const std::string file = PathOf(path);
-  const AtlasOptions options = {.public_key = KeyOf(public_key), .name = name, .min_epoch = min_epoch};
+  const AtlasOptions options = {
+      .public_key = TrustedOf(public_key, key_ring), .name = name, .min_epoch = min_epoch};
   const py::gil_scoped_release release;
   return {ValueOrThrow(Atlas::Open(file, options))};
 }
@@ -86,7 +87,7 @@ namespace cairn {
 void BindAtlases(py::module_& module) {
   py::class_<PyAtlas>(module, "Atlas")
       .def_static("open", &OpenAtlas, py::arg("path"), py::kw_only(), py::arg("public_key") = py::none(),
-                  py::arg("name") = "", py::arg("min_epoch") = 0)
+                  py::arg("name") = "", py::arg("min_epoch") = 0, py::arg("key_ring") = py::none())
       .def_property_readonly("map_names", &MapNames)
       .def(
           "find_map",

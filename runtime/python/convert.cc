@@ -45,9 +45,12 @@ std::string PathOf(const py::object& path) {
   return name;
 }
 
-std::optional<PublicKey> KeyOf(const std::optional<py::bytes>& given) {
-  if (!given) return std::nullopt;
-  const std::string bytes = *given;
+std::optional<KeyRing> TrustedOf(const std::optional<py::bytes>& public_key, const py::object& key_ring) {
+  if (public_key && !key_ring.is_none())
+    throw py::value_error("public_key and key_ring are given; expected one of them");
+  if (!key_ring.is_none()) return ValueOrThrow(ReadTrustedKeys(PathOf(key_ring)));
+  if (!public_key) return std::nullopt;
+  const std::string bytes = *public_key;
   PublicKey key;
   if (bytes.size() != key.size())
     throw py::value_error(

@@ -10,7 +10,7 @@
 #include <pybind11/pybind11.h>
 
 #include "core/base/pooled.h"
-#include "core/seal/signing_key.h"
+#include "core/seal/key_ring.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/track/camera_motion.h"
 
@@ -42,8 +42,10 @@ void BindErrors(pybind11::module_& module);
 
 // The name of a file, as bytes: it need not be text.  Throws a ValueError where there is none.
 std::string PathOf(const pybind11::object& path);
-// None: none.  Throws a ValueError for another number of bytes.
-std::optional<PublicKey> KeyOf(const std::optional<pybind11::bytes>& given);
+// A key, or the file of a ring of keys; None: none.  Throws a ValueError for another number of bytes and
+// where both are given, cairn.Error as ReadTrustedKeys.
+std::optional<KeyRing> TrustedOf(const std::optional<pybind11::bytes>& public_key,
+                                 const pybind11::object& key_ring);
 
 // The pixels of an array of uint8, height x width, not copied; rows may have gaps.  Throws a TypeError for
 // another dtype and a ValueError for another shape or order, which say what was found.

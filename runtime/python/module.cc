@@ -9,6 +9,7 @@
 #include <pybind11/stl.h>
 
 #include "core/features/features.h"
+#include "core/seal/accept_key_ring.h"
 #include "runtime/drive/route.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -27,13 +28,13 @@ namespace cairn {
 namespace {
 
 PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::optional<py::bytes>& public_key,
-              const std::string& required_name, uint64_t min_epoch) {
+              const std::string& required_name, uint64_t min_epoch, const py::object& key_ring) {
   const std::string name = PathOf(path);
   if (memory_budget_bytes < 0)
     throw py::value_error(
         fmt::format("memory_budget_bytes is {}; must not be negative", memory_budget_bytes));
   const MapOptions options = {.memory_budget_bytes = memory_budget_bytes,
-                              .public_key = KeyOf(public_key),
+                              .public_key = TrustedOf(public_key, key_ring),
                               .name = required_name,
                               .min_epoch = min_epoch};
   const py::gil_scoped_release release;
@@ -129,35 +130,48 @@ void BindUpdates(py::module_& module) {
   module.def(
       "update_map",
       [](const py::object& map, const py::object& delta, const std::optional<py::bytes>& public_key,
-         const std::string& name, uint64_t min_epoch, bool allow_older) {
+         const std::string& name, uint64_t min_epoch, bool allow_older, const py::object& key_ring,
+         const py::object& signatures) {
         const std::string map_path = PathOf(map), delta_path = PathOf(delta);
-        const UpdateOptions options = {.public_key = KeyOf(public_key),
+        const UpdateOptions options = {.public_key = TrustedOf(public_key, key_ring),
                                        .allow_older = allow_older,
                                        .name = name,
-                                       .min_epoch = min_epoch};
+                                       .min_epoch = min_epoch,
+                                       .signatures = signatures.is_none() ? "" : PathOf(signatures)};
         const py::gil_scoped_release release;
         return ValueOrThrow(UpdateMap(map_path, delta_path, options));
       },
       py::arg("map"), py::arg("delta"), py::kw_only(), py::arg("public_key") = py::none(),
-      py::arg("name") = "", py::arg("min_epoch") = 0, py::arg("allow_older") = false);
+      py::arg("name") = "", py::arg("min_epoch") = 0, py::arg("allow_older") = false,
+      py::arg("key_ring") = py::none(), py::arg("signatures") = py::none());
   module.def(
       "roll_back_map",
       [](const py::object& map, const std::optional<py::bytes>& public_key, const std::string& name,
-         uint64_t min_epoch) {
+         uint64_t min_epoch, const py::object& key_ring) {
         const std::string map_path = PathOf(map);
-        const UpdateOptions options = {.public_key = KeyOf(public_key), .name = name, .min_epoch = min_epoch};
+        const UpdateOptions options = {
+            .public_key = TrustedOf(public_key, key_ring), .name = name, .min_epoch = min_epoch};
         const py::gil_scoped_release release;
         ThrowIfError(RollBackMap(map_path, options));
       },
       py::arg("map"), py::kw_only(), py::arg("public_key") = py::none(), py::arg("name") = "",
-      py::arg("min_epoch") = 0);
+      py::arg("min_epoch") = 0, py::arg("key_ring") = py::none());
+  module.def(
+      "accept_key_ring",
+      [](const py::object& ring, const py::object& next) {
+        const std::string ring_path = PathOf(ring), next_path = PathOf(next);
+        const py::gil_scoped_release release;
+        return ValueOrThrow(AcceptKeyRings(ring_path, {next_path})).version;
+      },
+      py::arg("ring"), py::arg("next"));
 }
 
 void BindMap(py::module_& module) {
   py::class_<PyMap>(module, "Map")
       .def_static("open", &OpenMap, py::arg("path"), py::kw_only(),
                   py::arg("memory_budget_bytes") = MapOptions().memory_budget_bytes,
-                  py::arg("public_key") = py::none(), py::arg("name") = "", py::arg("min_epoch") = 0)
+                  py::arg("public_key") = py::none(), py::arg("name") = "", py::arg("min_epoch") = 0,
+                  py::arg("key_ring") = py::none())
       .def(
           "camera_for_size",
           [](const PyMap& self, int width, int height) {

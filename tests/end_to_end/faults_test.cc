@@ -13,6 +13,8 @@
 #include "core/delta/map_delta.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
+#include "core/seal/key_ring.h"
+#include "core/seal/map_seal.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {
@@ -104,8 +106,9 @@ class Faults : public testing::Test {
     EXPECT_GT(num_sites, 10);
   }
 
-  // Lets one call of a kind fail; `log` is made if there was one.
-  ProgramRun RunWithFault(const std::string& kind, int error, int at, const std::string& log,
+  // Lets one call of a kind fail, or kills the program before it; `log` is made if there was one.
+  template <typename ErrorOrKilled>
+  ProgramRun RunWithFault(const std::string& kind, const ErrorOrKilled& error, int at, const std::string& log,
                           const std::string& command) const {
     return RunShell(fmt::format(
         "LD_PRELOAD='{}' FAULT_KIND={} FAULT_ERROR={} FAULT_AT={} FAULT_FOLDER='{}' FAULT_LOG='{}' {}",
@@ -155,6 +158,117 @@ TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
     if (is_new) {
       EXPECT_TRUE(after.at("map.previous") == Bytes("2"));
     }
+  });
+}
+
+// Two of a ring of three sign each epoch: Alice in the seal, Bob beside it.  Whatever fails, or wherever the
+// robot stops, a map that the ring trusts is in place, and the next update and the way back work.
+class RingFaults : public Faults {
+ protected:
+  RingFaults() {
+    Run("cairn keygen " + folder_ / "bob");
+    Run("cairn keygen " + folder_ / "carol");
+    Run("cairn keys make alice=" + folder_ / "key.pub" + " bob=" + folder_ / "bob.pub" +
+        " carol=" + folder_ / "carol.pub" + " --threshold 2 -o " + folder_ / "ring");
+    for (const std::string epoch : {"1", "2", "3"})
+      Run("cairn sign " + folder_ / epoch + " --key " + folder_ / "bob" + " --add");
+    fs::rename(folder_ / "3.signatures", folder_ / "delta.signatures");
+    ring_ = ReadTrustedKeys(folder_ / "ring").value();
+    before_ = {{"map", Bytes("2")},
+               {"map.previous", Bytes("1")},
+               {"map.signatures", Bytes("1.signatures") + Bytes("2.signatures")}};
+    apply_ = "cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place --public-key " +
+             folder_ / "ring";
+    rollback_ = "cairn update rollback " + work_ + "/map --public-key " + folder_ / "ring";
+  }
+
+  // Of the map in place; 0: none that the ring trusts.
+  uint64_t TrustedEpoch(const std::string& name) const {
+    const Result<MapFile> map = MapFile::Open(work_ + "/" + name, {.public_key = ring_});
+    return map.ok() && CheckFileHash(work_ + "/" + name).ok() ? map->head().epoch : 0;
+  }
+
+  // Puts the files in the work folder, and kills the program before one call after the other, for all kinds.
+  void ForEachKill(const std::string& command, const std::function<void()>& check) {
+    int num_kills = 0;
+    for (const char* kind : {"open", "write", "sync", "rename", "link", "unlink", "close"}) {
+      for (int at = 1;; ++at) {
+        ASSERT_LT(at, 2000);
+        fs::remove_all(work_);
+        fs::create_directories(work_);
+        for (const auto& [name, bytes] : before_) WriteFile(work_ + "/" + name, bytes);
+        fs::remove(folder_ / "log");
+        const ProgramRun run = RunWithFault(kind, "killed", at, folder_ / "log", command);
+        if (!fs::exists(folder_ / "log")) {
+          EXPECT_EQ(run.exit_code, 0) << run.err;
+          break;
+        }
+        ++num_kills;
+        SCOPED_TRACE(fmt::format("{}, killed before {} {}", command, at, ReadFile(folder_ / "log").value()));
+        EXPECT_NE(run.exit_code, 0);
+        check();
+      }
+    }
+    std::printf("%s: %d kills\n", command.c_str(), num_kills);
+    EXPECT_GT(num_kills, 20);
+  }
+
+  KeyRing ring_;
+  Contents before_;
+  std::string apply_, rollback_;
+};
+
+TEST_F(RingFaults, KilledUpdateLeavesATrustedMapAndTheNextOneWorks) {
+  ForEachKill(apply_, [&] {
+    const uint64_t epoch = TrustedEpoch("map");
+    EXPECT_TRUE(epoch == 2 || epoch == 3) << epoch;
+    // The map before is gone for no moment, though it may be that of the update that did not come about.
+    const uint64_t before = TrustedEpoch("map.previous");
+    EXPECT_TRUE(before == 1 || before == 2) << before;
+    EXPECT_TRUE(epoch == 2 || before == 2);
+    const ProgramRun again = RunShell(apply_);
+    EXPECT_EQ(again.exit_code, 0) << again.err;
+    EXPECT_EQ(TrustedEpoch("map"), 3U);
+    EXPECT_EQ(TrustedEpoch("map.previous"), 2U);
+    EXPECT_EQ(ContentsOf(work_).size(), 3U);  // nothing temporary stays
+    EXPECT_EQ(RunShell(rollback_).exit_code, 0);
+    EXPECT_EQ(TrustedEpoch("map"), 2U);
+    EXPECT_EQ(TrustedEpoch("map.previous"), 3U);
+  });
+}
+
+TEST_F(RingFaults, KilledRollbackLeavesBothMapsTrusted) {
+  ForEachKill(rollback_, [&] {
+    const uint64_t epoch = TrustedEpoch("map");
+    EXPECT_TRUE(epoch == 1 || epoch == 2) << epoch;
+    EXPECT_EQ(TrustedEpoch("map.previous"), 3 - epoch);
+  });
+}
+
+TEST_F(RingFaults, FailedUpdateLeavesATrustedMapAndTheRightOneBefore) {
+  ForEachFault(apply_, before_, [&](const ProgramRun& run, const Contents& after) {
+    const uint64_t epoch = TrustedEpoch("map");
+    EXPECT_TRUE(epoch == 3 || (epoch == 2 && run.exit_code != 0)) << epoch;
+    EXPECT_EQ(TrustedEpoch("map.previous"), epoch - 1);
+    EXPECT_EQ(after.size(), 3U);
+    if (epoch == 3 && run.exit_code != 0) {
+      EXPECT_THAT(run.err, HasSubstr("is in place; but"));
+    }
+  });
+}
+
+TEST_F(RingFaults, KilledAcceptLeavesTheOldRingOrTheNewOne) {
+  const std::string next = folder_ / "next.ring", bob = folder_ / "bob";
+  Run("cairn keys make alice=" + folder_ / "key.pub" + " bob=" + bob + ".pub --threshold 2 --after " +
+      folder_ / "ring" + " -o " + next);
+  for (const std::string& key : {folder_ / "key", bob}) Run("cairn keys sign " + next + " --key " + key);
+  before_ = {{"robot.ring", Bytes("ring")}};
+  const std::string accept = "cairn keys accept " + work_ + "/robot.ring " + next;
+  ForEachKill(accept, [&] {
+    const std::string ring = ReadFile(work_ + "/robot.ring").value();
+    EXPECT_TRUE(ring == Bytes("ring") || ring == Bytes("next.ring"));
+    EXPECT_EQ(RunShell(accept).exit_code, 0);
+    EXPECT_EQ(ReadFile(work_ + "/robot.ring").value(), Bytes("next.ring"));
   });
 }
 

@@ -32,7 +32,11 @@ static void CheckMaps(const char* path) {
   cairn_map_options options = CAIRN_MAP_OPTIONS_INIT;
   options.public_key = key;
   CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_NOT_SIGNED, path);
+  options.key_ring = path;
+  CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_INVALID_ARGUMENT, "give one of them");
   options.public_key = NULL;
+  CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_CORRUPT, "not a public key");
+  options.key_ring = NULL;
   options.memory_budget_bytes = -1;
   CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_INVALID_ARGUMENT, "memory_budget_bytes is -1");
   options.size = 3;

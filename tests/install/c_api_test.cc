@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <thread>
 #include <vector>
@@ -13,6 +14,8 @@
 #include "core/delta/map_delta.h"
 #include "core/features/sift.h"
 #include "core/files/file.h"
+#include "core/seal/accept_key_ring.h"
+#include "core/seal/map_seal.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/localizer.h"
 #include "tests/runtime/localize/poster_scene.h"
@@ -339,6 +342,67 @@ TEST_F(CApi, UpdatesGoForwardAndOpeningAsksForNameAndEpoch) {
   options.min_epoch = 3;
   EXPECT_EQ(cairn_map_roll_back(map.c_str(), &options), CAIRN_OK) << cairn_last_error();
   EXPECT_EQ(*ReadFile(map), *ReadFile(third));
+}
+
+// The poster's map in epochs 1 and 2, each signed by two; then the first one's key leaves the ring.
+TEST_F(CApi, RingOfKeysIsTrustedAndReplaced) {
+  const std::string folder = testing::TempDir(), map = folder + "/c_ring.cairn",
+                    delta = folder + "/c_ring.delta";
+  const std::string second = folder + "/c_ring_2.cairn", ring = folder + "/c_ring",
+                    next = folder + "/c_ring_next";
+  const KeyPair alice = MakeKeyPair(), bob = MakeKeyPair(), carol = MakeKeyPair();
+  for (const std::string& path : {map, second, delta, next}) std::filesystem::remove(SignaturesPath(path));
+  ASSERT_TRUE(SignMap(path_, alice.secret_key, map, 1).ok());
+  ASSERT_TRUE(SignMap(path_, alice.secret_key, second, 2).ok());
+  KeyRing keys;
+  keys.version = 1;
+  keys.threshold = 2;
+  keys.keys = {{"alice", alice.public_key}, {"bob", bob.public_key}};
+  ASSERT_TRUE(WriteFileAtomically(ring, EncodeKeyRing(keys).value()).ok());
+
+  cairn_map_options options = CAIRN_MAP_OPTIONS_INIT;
+  options.key_ring = ring.c_str();
+  cairn_map* open = nullptr;
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_NOT_SIGNED);
+  EXPECT_NE(std::strstr(cairn_last_error(), "1 of the 2 signatures"), nullptr) << cairn_last_error();
+  ASSERT_TRUE(AddMapSignature(map, bob.secret_key, SignaturesPath(map)).ok());
+  ASSERT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(cairn_map_close(open), CAIRN_OK);
+  options.public_key = alice.public_key.data();
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_INVALID_ARGUMENT);
+  options.public_key = nullptr;
+  options.key_ring = "nowhere.ring";
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_NOT_FOUND);
+  options.key_ring = ring.c_str();
+
+  const auto made = MakeMapDelta(map, second, alice.secret_key);
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  ASSERT_TRUE(WriteFileAtomically(delta, EncodeMapDelta(*made)).ok());
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_NOT_SIGNED);
+  const std::string bobs = folder + "/c_ring.bobs";
+  std::filesystem::remove(bobs);
+  ASSERT_TRUE(AddMapSignature(second, bob.secret_key, bobs).ok());
+  options.signatures = bobs.c_str();
+  ASSERT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(*ReadFile(map), *ReadFile(second));
+  EXPECT_EQ(cairn_map_roll_back(map.c_str(), &options), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(cairn_map_roll_back(map.c_str(), &options), CAIRN_OK) << cairn_last_error();
+
+  keys.version = 2;
+  keys.keys[0] = {"carol", carol.public_key};
+  ASSERT_TRUE(WriteFileAtomically(next, EncodeKeyRing(keys).value()).ok());
+  uint64_t version = 0;
+  EXPECT_EQ(cairn_key_ring_accept(ring.c_str(), next.c_str(), &version), CAIRN_WRONG_KEY);
+  for (const KeyPair* key : {&alice, &bob}) ASSERT_TRUE(SignKeyRing(next, key->secret_key).ok());
+  EXPECT_EQ(cairn_key_ring_accept(ring.c_str(), next.c_str(), &version), CAIRN_NOT_SIGNED);
+  EXPECT_EQ(version, 0U);
+  ASSERT_TRUE(SignKeyRing(next, carol.secret_key).ok());
+  EXPECT_EQ(cairn_key_ring_accept(ring.c_str(), next.c_str(), &version), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(version, 2U);
+  EXPECT_EQ(cairn_key_ring_accept(ring.c_str(), next.c_str(), nullptr), CAIRN_OK);  // sent twice
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_NOT_SIGNED);
+  EXPECT_EQ(cairn_key_ring_accept(nullptr, next.c_str(), nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_key_ring_accept(ring.c_str(), nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
 }
 
 // A program built with the first release knows neither name and epochs nor that there is more of a struct.

@@ -993,6 +993,44 @@ class Updates(Poster):
             cairn.roll_back_map(second, public_key=public_key, min_epoch=2)
             self.assertEqual(cairn.Map.open(second).epoch, 2)
 
+    def test_ring_of_keys_is_trusted_and_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            first, second, delta, ring, following = (pathlib.Path(folder) / name for name in ["1", "2", "d", "ring", "next"])
+            alice, bob, carol = (pathlib.Path(folder) / name for name in ["alice", "bob", "carol"])
+            for words in [["keygen", alice], ["keygen", bob], ["keygen", carol],
+                          ["keys", "make", f"alice={alice}.pub", f"bob={bob}.pub", "--threshold", "2", "-o", ring],
+                          ["keys", "make", f"carol={carol}.pub", f"bob={bob}.pub", "--threshold", "2", "--after", ring, "-o", following],
+                          ["keys", "sign", following, "--key", alice], ["keys", "sign", following, "--key", bob],
+                          ["sign", POSTER / "poster.cairn", "--key", alice, "-o", first],
+                          ["sign", POSTER / "poster.cairn", "--key", alice, "--after", first, "-o", second],
+                          ["update", "delta", first, second, "-o", delta, "--key", alice],
+                          ["sign", first, "--key", bob, "--add"]]:
+                run = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
+                self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(cairn.Map.open(first, key_ring=ring).epoch, 1)
+            for call, name in [
+                (lambda: cairn.Map.open(second, key_ring=ring), "not_signed"),
+                (lambda: cairn.update_map(first, delta, key_ring=ring), "not_signed"),
+                (lambda: cairn.Map.open(first, key_ring=first), "corrupt"),
+                (lambda: cairn.accept_key_ring(ring, following), "not_signed"),
+            ]:
+                with self.assertRaises(cairn.Error) as caught:
+                    call()
+                self.assertEqual(caught.exception.name, name)
+            with self.assertRaises(ValueError):
+                cairn.Map.open(first, key_ring=ring, public_key=bytes(32))
+            sent = pathlib.Path(folder) / "sent"
+            subprocess.run([PROGRAM, "sign", second, "--key", bob, "--add", "-o", sent], check=True, capture_output=True)
+            self.assertTrue(cairn.update_map(first, delta, key_ring=ring, signatures=sent))
+            self.assertEqual(cairn.Map.open(first, key_ring=ring).epoch, 2)
+            cairn.roll_back_map(first, key_ring=ring)
+            self.assertEqual(cairn.Map.open(first, key_ring=ring).epoch, 1)
+            subprocess.run([PROGRAM, "keys", "sign", following, "--key", carol], check=True, capture_output=True)
+            self.assertEqual(cairn.accept_key_ring(ring, following), 2)
+            with self.assertRaises(cairn.Error) as caught:
+                cairn.Map.open(first, key_ring=ring)
+            self.assertEqual(caught.exception.name, "not_signed")
+
 
 class Facts(Poster):
     def test_map_and_camera_say_what_they_are(self):

@@ -1,6 +1,6 @@
 // A library to be preloaded: lets one call of one kind fail, as full disks, broken ones and spent limits do.
 //   FAULT_KIND=open|read|write|sync|rename|link|unlink|close
-//   FAULT_ERROR=N             what the call says: an errno
+//   FAULT_ERROR=N             what the call says: an errno; "killed": the process is killed just before it
 //   FAULT_AT=N                the N-th call of the kind fails (from 1)
 //   FAULT_FOLDER=DIR          only calls on files in this folder count; without it, all of the program's
 //   FAULT_LOG=FILE            gets a line "KIND PATH" for the call that failed; not made where none failed
@@ -15,6 +15,7 @@
 #include <atomic>
 #include <cerrno>
 #include <climits>
+#include <csignal>
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
@@ -22,6 +23,8 @@
 #include <string>
 
 namespace {
+
+constexpr int kKilled = -1;
 
 struct Fault {
   std::string kind, folder, log;
@@ -36,7 +39,8 @@ const Fault& TheFault() {
       return std::string(value == nullptr ? "" : value);
     };
     return new Fault{text("FAULT_KIND"), text("FAULT_FOLDER"), text("FAULT_LOG"),
-                     std::atoi(text("FAULT_ERROR").c_str()), std::atol(text("FAULT_AT").c_str())};
+                     text("FAULT_ERROR") == "killed" ? kKilled : std::atoi(text("FAULT_ERROR").c_str()),
+                     std::atol(text("FAULT_AT").c_str())};
   }();
   return *fault;
 }
@@ -57,6 +61,7 @@ bool Fails(const char* kind, const std::string& path) {
   if (fault.kind != kind || path.compare(0, fault.folder.size(), fault.folder) != 0) return false;
   if (++num_calls != fault.at) return false;
   Log(path);
+  if (fault.error == kKilled) syscall(SYS_kill, syscall(SYS_getpid), SIGKILL);
   errno = fault.error;
   return true;
 }

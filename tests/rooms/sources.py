@@ -38,6 +38,7 @@ NUMBERED = {
     "Mariottini11": "eq. 1-8, Table I, fn 1-5",
     "Booij06": "eq. 1, §IV-B steps 1-6",
     "Simsarian96": "§2.2 step I, §2.2 step II, §2.2 step III, §2.2 step IV, Fig. 4, Fig. 6, Fig. 7",
+    "TUF": "§5.3.4, §5.3.5, §5.3.6, §5.3.7, §5.3.8, §5.3.10, §5.3.11",
 }
 
 LOCATOR = re.compile(

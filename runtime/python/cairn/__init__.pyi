@@ -33,9 +33,12 @@ class Map:
     @staticmethod
     def open(
         path: str | PathLike[str], *, memory_budget_bytes: int = ..., public_key: bytes | None = None,
-        name: str = "", min_epoch: int = 0
+        name: str = "", min_epoch: int = 0, key_ring: str | PathLike[str] | None = None
     ) -> Map:
         """Raises Error.  `public_key`: 32 bytes; maps that this key has not signed are refused.
+
+        `key_ring`, in its place: file of a ring of keys (`cairn keys make`) or of a public key; maps that fewer keys of
+        the ring have signed than it wants are refused (not_signed, wrong_key).
 
         So are maps of another `name` (other_map) and of an earlier epoch than `min_epoch` (not_newer).  Name and
         epoch are only to be trusted with a key: without one, anybody can write a map that says so.
@@ -262,8 +265,11 @@ class Atlas:
     """Many maps of a site as one (`cairn atlas`): immutable, shared by all threads.  Maps' files are opened when they are needed."""
 
     @staticmethod
-    def open(path: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0) -> Atlas:
-        """Raises Error.  `public_key`, `name`, `min_epoch`: the atlas's, as for Map.open."""
+    def open(
+        path: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0,
+        key_ring: str | PathLike[str] | None = None
+    ) -> Atlas:
+        """Raises Error.  `public_key`, `key_ring`, `name`, `min_epoch`: the atlas's, as for Map.open."""
     @property
     def map_names(self) -> list[str]: ...
     def find_map(self, name: str) -> int:
@@ -721,19 +727,29 @@ def read_scans(path: str | PathLike[str]) -> list[Scan]:
 
 def update_map(
     map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None, name: str = "",
-    min_epoch: int = 0, allow_older: bool = False
+    min_epoch: int = 0, allow_older: bool = False, key_ring: str | PathLike[str] | None = None,
+    signatures: str | PathLike[str] | None = None
 ) -> bool:
     """Replaces the map's file by the one that a delta (`cairn update delta`) leads to; the old one stays beside it.  False: it already is the new one.
 
     Raises Error: invalid_argument (the delta leads from another map), not_signed and wrong_key (with `public_key`), busy;
     not_newer and other_map (with `public_key`, or where the map is signed: the new one must have its name and a later epoch,
-    unless `allow_older`; also what `name` and `min_epoch` refuse).
+    unless `allow_older`; also what `name` and `min_epoch` refuse).  `key_ring`: as for Map.open.  `signatures`: file with
+    more signatures of the new map [DELTA.signatures, where it is there].
     """
 
 def roll_back_map(
-    map: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0
+    map: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0,
+    key_ring: str | PathLike[str] | None = None
 ) -> None:
     """Exchanges the map and the one before the last update; a second call exchanges them back.
 
     Raises Error: not_found, other_map (the one before is another map), not_newer (before `min_epoch`).
+    """
+
+def accept_key_ring(ring: str | PathLike[str], next: str | PathLike[str]) -> int:
+    """Replaces a robot's ring of keys by the one after it, whose signatures are beside it in NEXT.signatures.
+
+    Returns the version that is then in place.  Raises Error: not_newer (an earlier version, or one that leaves out others),
+    not_signed and wrong_key (enough keys of either ring must have signed it), busy.
     """

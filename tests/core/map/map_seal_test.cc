@@ -171,17 +171,17 @@ TEST(MapSeal, NextEpochFollowsASignedMapOfThatNameAndKey) {
   const KeyPair keys = MakeKeyPair(), others = MakeKeyPair();
   const std::string counted = InFolder("counted.cairn"), last = InFolder("last.cairn");
   ASSERT_TRUE(SignMap(path, keys.secret_key, counted, 6).ok());
-  EXPECT_EQ(*EpochAfter(counted, "example", keys.secret_key), 7U);
-  EXPECT_EQ(EpochAfter(counted, "other", keys.secret_key).error().code, ErrorCode::kOtherMap);
-  EXPECT_EQ(EpochAfter(counted, "example", others.secret_key).error().code, ErrorCode::kWrongKey);
-  EXPECT_EQ(EpochAfter(path, "example", keys.secret_key).error().code, ErrorCode::kNotSigned);
-  EXPECT_EQ(EpochAfter(InFolder("no such"), "example", keys.secret_key).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(*EpochAfter(counted, "example", keys.public_key), 7U);
+  EXPECT_EQ(EpochAfter(counted, "other", keys.public_key).error().code, ErrorCode::kOtherMap);
+  EXPECT_EQ(EpochAfter(counted, "example", others.public_key).error().code, ErrorCode::kWrongKey);
+  EXPECT_EQ(EpochAfter(path, "example", keys.public_key).error().code, ErrorCode::kNotSigned);
+  EXPECT_EQ(EpochAfter(InFolder("no such"), "example", keys.public_key).error().code, ErrorCode::kNotFound);
   constexpr uint64_t kLast = std::numeric_limits<uint64_t>::max();
   ASSERT_EQ(*SignMap(path, keys.secret_key, last, kLast - 1), kLast - 1);
-  EXPECT_EQ(*EpochAfter(last, "example", keys.secret_key), kLast);
+  EXPECT_EQ(*EpochAfter(last, "example", keys.public_key), kLast);
   ASSERT_EQ(*SignMap(path, keys.secret_key, last, kLast), kLast);
   EXPECT_TRUE(Verify(last, keys.public_key).ok());
-  EXPECT_EQ(EpochAfter(last, "example", keys.secret_key).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(EpochAfter(last, "example", keys.public_key).error().code, ErrorCode::kInvalidArgument);
 }
 
 // The conditions for a later map to follow, and the required epoch.
