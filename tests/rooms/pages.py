@@ -5,7 +5,8 @@ usage: pages.py ROOT
 
 A page is a Markdown file of the root, of a recipe's folder, or below docs, schemas or bench.  Its relative links lead to files, folders and
 headings that are there.  docs/README.md, which the README names, has a link to every page below docs; from there links lead
-to every page below schemas and bench too, without the changelog.  Pages that sources name are there.  The table of bench/README.md is what bench/summary.py makes of the pages.
+to every page below schemas and bench too, without the changelog.  Pages that sources name are there, and so are the tests that
+docs/security.md names, one at least for each thing that somebody may try.  The table of bench/README.md is what bench/summary.py makes of the pages.
 """
 
 import collections
@@ -22,6 +23,7 @@ from summary import anchor_of, read_rows, with_table  # noqa: E402
 START = "docs/README.md"
 REACHED = ("docs", "schemas", "bench")
 REFERENCE_OF_OPTIONS = "docs/recipe.md"  # written by the program
+PAGE_OF_TESTS = "docs/security.md"
 LOG = "CHANGELOG.md"  # a list of changes is nobody's way to a page
 SOURCES = (*PARTS, "ros", "bench")
 
@@ -31,6 +33,8 @@ COMMENT = re.compile(r"<!--.*?-->", re.S)
 LINK = re.compile(r"\]\(\s*<?([^)\s>]+)>?[^)]*\)")
 REFERENCE = re.compile(r"^\s*\[[^]]+\]:\s*(\S+)", re.M)
 HEADING = re.compile(r"^#+ (.*)$", re.M)
+TEST = re.compile(r"^TEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\s*\)", re.M)
+NAMED_TEST = re.compile(r"`([A-Z]\w*\.[A-Z]\w*)`")
 NAMED = re.compile(r"\b(?:docs|schemas|bench)/[\w/.-]*\.md\b")
 
 
@@ -115,6 +119,20 @@ def name_faults(root):
     return found
 
 
+def test_faults(root):
+    """Tests that the page of threats names and that are not there, and rows that name none."""
+    page = root / PAGE_OF_TESTS
+    if not page.is_file():
+        return []
+    text = page.read_text(encoding="utf-8")
+    tests = {".".join(test) for path in (root / "tests").rglob("*.cc") for test in TEST.findall(path.read_text(encoding="utf-8"))}
+    found = [f"{PAGE_OF_TESTS}: names the test {name}, which is not there" for name in NAMED_TEST.findall(text) if name not in tests]
+    for first, cells in rows_of(text):
+        if first[-1:] == ["test"] and not re.match(r"-+$", cells[0]) and not NAMED_TEST.search(cells[-1]):
+            found.append(f"{PAGE_OF_TESTS}: '{cells[0][:60]}' has no test that shows it; write one and name it")
+    return found
+
+
 def table_faults(root):
     """Faults of the benchmarks' summaries, and a table that is not what they make."""
     rows, found = read_rows(root)
@@ -161,7 +179,7 @@ def faults(root):
     """Sentences, one for each fault."""
     pages = pages_of(root)
     found, leads_to = link_faults(root, pages)
-    return found + reach_faults(pages, leads_to) + name_faults(root) + table_faults(root) + default_faults(root, pages)
+    return found + reach_faults(pages, leads_to) + name_faults(root) + test_faults(root) + table_faults(root) + default_faults(root, pages)
 
 
 def main():

@@ -110,6 +110,18 @@ class Pages(unittest.TestCase):
         self.assertEqual(self.fault_of("core/base/a.h", "// docs/gone.md says how.\n"), "core/base/a.h: names docs/gone.md, which is not there")
         self.assertEqual(self.faults_with({"core/base/a.h": "// docs/map.md says how.\n"}), [])
 
+    def test_tests_that_the_page_of_threats_names_are_there(self):
+        def found(rows):
+            return self.faults_with({"docs/README.md": tree()["docs/README.md"].replace("[next]", "[threats](security.md) [next]"),
+                                     "docs/security.md": f"# Threats\n\n| he tries | test |\n|---|---|\n{rows}",
+                                     "tests/core/map_test.cc": "TEST_F(Map, IsClosed) {\n}\nTEST(Ring,\n     IsRead) {\n}\n// TEST(Ring, IsGone)\n"})
+
+        self.assertEqual(found("| to open | `Map.IsClosed`, `Ring.IsRead` |\n"), [])
+        self.assertEqual(found("| to open | `Map.IsClosed`, `Map.IsOpen` |\n"), ["docs/security.md: names the test Map.IsOpen, which is not there"])
+        self.assertEqual(found("| to open | `Ring.IsGone` |\n"), ["docs/security.md: names the test Ring.IsGone, which is not there"])
+        self.assertEqual(found("| to open | `Map.IsClosed` |\n| to shut | `map` |\n"),
+                         ["docs/security.md: 'to shut' has no test that shows it; write one and name it"])
+
     def test_the_table_is_that_of_the_pages(self):
         page = page_of(ORDER[0])
         found = self.faults_with({}, table=f"# Benchmarks\n\n{BEGIN}\n| old |\n{END}\n")
