@@ -56,15 +56,16 @@ Status CheckMayFollow(const MapFile& next, const std::string& next_name, const s
   return CheckFollows(next.head(), next_name, old->head(), old_path, options.allow_older);
 }
 
-// A file of signatures beside a map that cannot be read counts as none: it is no reason to keep the map, and
-// the new one's take its place.
-SignatureList ReadableSignatures(const std::string& path) {
-  const Result<SignatureList> signatures = ReadSignatures(path);
-  return signatures.ok() ? *signatures : SignatureList();
+// The signatures at this path.  A file that has none counts as if it were not there: it is no reason to keep
+// the map, and the new one's take its place.  Errors: Io (it may have some, which must not be lost).
+Result<SignatureList> SignaturesAt(const std::string& path) {
+  Result<SignatureList> signatures = ReadSignatures(path);
+  if (!signatures.ok() && signatures.error().code != ErrorCode::kIo) return SignatureList();
+  return signatures;
 }
 
-SignatureList SignaturesBeside(const std::string& map_path) {
-  return ReadableSignatures(SignaturesPath(FileOf(map_path)));
+Result<SignatureList> SignaturesBeside(const std::string& map_path) {
+  return SignaturesAt(SignaturesPath(FileOf(map_path)));
 }
 
 // Those that come with a delta.
@@ -93,7 +94,7 @@ Result<NextMap> WriteMap(const std::string& bytes, const std::string& path, cons
                          const UpdateOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
   CAIRN_RETURN_IF_ERROR(file.Write(bytes));
-  const SignatureList beside = SignaturesBeside(old_path);
+  CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesBeside(old_path));
   const Result<MapFile> map = MapFile::Open(
       file.temporary(), {.public_key = options.public_key, .signatures = Union(signatures, beside)});
   if (!map.ok()) {
@@ -118,11 +119,12 @@ Result<NextMap> WriteMap(const std::string& bytes, const std::string& path, cons
 // has opened the map just before it was renamed finds its signatures afterwards, too.
 Status KeepSignatures(const Seal& next, const SignatureList& candidates, const std::string& map_path) {
   const std::string path = SignaturesPath(map_path);
-  const SignatureList beside = ReadableSignatures(path);
+  CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesAt(path));
   SignatureList kept = ValidSignatures(SignedBytesOf(next), Union(candidates, beside));
   if (std::includes(beside.begin(), beside.end(), kept.begin(), kept.end())) return Ok();
   for (const std::string& there : {map_path, PreviousMapPath(map_path)}) {
     const Result<Seal> seal = ReadSeal(there);
+    if (!seal.ok() && seal.error().code == ErrorCode::kIo) return seal.error();
     if (seal.ok()) kept = Union(std::move(kept), ValidSignatures(SignedBytesOf(*seal), beside));
   }
   if (kept.size() > kMaxSignatures) {
@@ -246,7 +248,8 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
     CAIRN_ASSIGN_OR_RETURN(NextMap next, WriteMap(bytes, new_path, old_path, delta_path, given, options));
-    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, Union(given, SignaturesBeside(old_path)), new_path));
+    CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesBeside(old_path));
+    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, Union(given, beside), new_path));
     return next.file.Finish();
   });
 }
@@ -262,10 +265,10 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
     CAIRN_ASSIGN_OR_RETURN(const SignatureList given, SignaturesOf(delta_path, options));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
     if (HashOf(old_bytes) == delta.new_hash) {
+      CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesBeside(map_path));
       CAIRN_ASSIGN_OR_RETURN(
           const MapFile map,
-          MapFile::Open(map_path, {.public_key = options.public_key,
-                                   .signatures = Union(given, SignaturesBeside(map_path))}));
+          MapFile::Open(map_path, {.public_key = options.public_key, .signatures = Union(given, beside)}));
       CAIRN_RETURN_IF_ERROR(CheckAskedFor(map.head(), map_path, options.name, options.min_epoch));
       CAIRN_RETURN_IF_ERROR(KeepSignatures(map.seal(), given, map_path));
       CAIRN_RETURN_IF_ERROR(SyncFolderOf(map_path, lock.descriptor()));

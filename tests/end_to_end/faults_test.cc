@@ -210,7 +210,7 @@ class RingFaults : public Faults {
       }
     }
     std::printf("%s: %d kills\n", command.c_str(), num_kills);
-    EXPECT_GT(num_kills, 20);
+    EXPECT_GT(num_kills, 10);
   }
 
   KeyRing ring_;

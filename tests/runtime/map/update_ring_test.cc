@@ -152,7 +152,7 @@ TEST_F(UpdateRing, GoingBackIsOneExchange) {
 TEST_F(UpdateRing, SignaturesMayComeInAnotherFile) {
   Install(1, {1});
   const std::string delta = Delta(1, 2);
-  EXPECT_EQ(Update(delta, [](UpdateOptions* options) { options->signatures = Path("none"); }),
+  EXPECT_EQ(Update(delta, [](UpdateOptions* options) { options->signatures = Path("nowhere"); }),
             ErrorCode::kNotFound);
   EXPECT_EQ(Update(delta, [](UpdateOptions* options) { options->signatures = Path("bobs.1"); }),
             ErrorCode::kNotSigned);
