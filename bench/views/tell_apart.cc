@@ -1,5 +1,5 @@
 // views_tell_apart [--seed N] [--num N] PLAN|hotelN...: robots that a turn about leaves in two places or
-// more drive until one is sure: by the next look that n poses ask for (runtime/paths/next_look.h), by the
+// more drive until one is sure: by the next look that n poses ask for (runtime/looks/next_look.h), by the
 // planner for the two most probable poses (runtime/paths/disambiguate.h), and at random.  Each robot scans
 // every half metre; its laser sees half the view around, as far as 5 m.
 #include <algorithm>
@@ -20,8 +20,8 @@
 #include "core/view_regions/derive_views.h"
 #include "runtime/beams/plan_rays.h"
 #include "runtime/belief/plan_tracker.h"
+#include "runtime/looks/next_look.h"
 #include "runtime/paths/disambiguate.h"
-#include "runtime/paths/next_look.h"
 #include "stages/decompose_views/plan/clean_plan.h"
 #include "stages/decompose_views/plan/read_plan.h"
 

@@ -14,10 +14,10 @@
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "pipeline/program/json_text.h"
+#include "runtime/looks/next_look.h"
+#include "runtime/looks/surveyed_looks.h"
 #include "runtime/map/map.h"
 #include "runtime/map/open_views.h"
-#include "runtime/paths/next_look.h"
-#include "runtime/paths/surveyed_looks.h"
 #include "stages/decompose_views/picture.h"
 
 namespace cairn::pipeline {

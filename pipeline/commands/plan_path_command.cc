@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "core/files/file.h"
@@ -11,6 +12,7 @@
 #include "runtime/map/open_views.h"
 #include "runtime/paths/disambiguate.h"
 #include "runtime/paths/plan_path.h"
+#include "runtime/paths/search_path.h"
 #include "stages/decompose_views/picture.h"
 
 namespace cairn::pipeline {
@@ -34,6 +36,30 @@ struct PathArguments {
   OptionArguments option_arguments;
 };
 
+// What a search says beside its path.
+void AddSearch(const SearchPath& search, ordered_json* line, decompose_views::ViewsOverlay* overlay) {
+  ordered_json unseen = ordered_json::array();
+  for (const FloorPart& part : search.unseen) {
+    unseen.push_back({{"area_m2", part.area_m2}, {"at", {part.at.x(), part.at.y()}}});
+    overlay->areas.insert(overlay->areas.end(), part.pieces.begin(), part.pieces.end());
+  }
+  (*line)["places"] = PathJson(search.places);
+  (*line)["fewest_places"] = search.fewest_places;
+  (*line)["domain_area_m2"] = search.domain_area_m2;
+  (*line)["seen_area_m2"] = search.seen_area_m2;
+  (*line)["visible_area_m2"] = search.visible_area_m2;
+  (*line)["unseen_area_m2"] = search.unseen_area_m2();
+  (*line)["unseen"] = unseen;
+  (*line)["unreached_area_m2"] = search.unreached_area_m2;
+  overlay->captions = {
+      fmt::format("{} places to look around from;", search.places.size()),
+      fmt::format("{} are needed at least", search.fewest_places),
+      fmt::format("seen: {:.1f} of {:.1f} m²", search.seen_area_m2, search.domain_area_m2),
+      fmt::format("{:.1f} m² cannot be seen (shaded)", search.unseen_area_m2()),
+      fmt::format("the robot's middle cannot get to {:.1f} m²", search.unreached_area_m2),
+  };
+}
+
 Status RunPath(const PathArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   if (arguments.kind != "search" && arguments.to.empty()) {
@@ -45,11 +71,7 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   }
   if (arguments.kind != "search") {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"seen_ratio"}, "is for --kind search; leave it out, or change the kind"));
-  }
-  if (arguments.kind == "short") {
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"max_num_places"}, "is for --kind min-link and search; leave it out, or change the kind"));
+        {"max_num_places", "seen_ratio"}, "is for --kind search; leave it out, or change the kind"));
   }
   CAIRN_ASSIGN_OR_RETURN(
       const std::shared_ptr<const Views> opened,
@@ -60,18 +82,28 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   PlanPath path;
   ordered_json line = {{"kind", arguments.kind}};
   decompose_views::ViewsOverlay overlay;
+  const Vec2 to = arguments.to.empty() ? from : Vec2(arguments.to[0], arguments.to[1]);
   if (arguments.kind == "search") {
     CAIRN_ASSIGN_OR_RETURN(SearchPath search, FindSearchPath(space, from, arguments.options));
-    line["places"] = PathJson(search.places);
-    line["seen_area_m2"] = search.seen_area_m2;
-    line["reachable_area_m2"] = search.reachable_area_m2;
-    overlay.captions = {fmt::format("{} places to look around from", search.places.size())};
+    AddSearch(search, &line, &overlay);
+    if (!search.unseen.empty()) {
+      spdlog::info(
+          "{:.1f} of {:.1f} m2 cannot be seen from where the robot gets to; the largest part, {:.1f} m2, "
+          "is around ({:.2f}, {:.2f})",
+          search.unseen_area_m2(), search.domain_area_m2, search.unseen[0].area_m2, search.unseen[0].at.x(),
+          search.unseen[0].at.y());
+    }
     path = std::move(search.path);
+  } else if (arguments.kind == "min-link") {
+    CAIRN_ASSIGN_OR_RETURN(MinimumLinkPath found, FindMinimumLinkPath(space, from, to, arguments.options));
+    line["fewest_links"] = found.fewest_links;
+    line["is_optimal"] = found.is_optimal();
+    overlay.captions = {found.is_optimal()
+                            ? "no path has fewer links"
+                            : fmt::format("no path has fewer than {} links", found.fewest_links)};
+    path = std::move(found.path);
   } else {
-    const Vec2 to(arguments.to[0], arguments.to[1]);
-    CAIRN_ASSIGN_OR_RETURN(path, arguments.kind == "short"
-                                     ? FindPath(space, from, to, arguments.options)
-                                     : FindMinimumLinkPath(space, from, to, arguments.options));
+    CAIRN_ASSIGN_OR_RETURN(path, FindPath(space, from, to, arguments.options));
   }
   line["length_m"] = path.length_m;
   line["links"] = path.num_links();
@@ -191,7 +223,9 @@ Command PlanPathCommand() {
         .SeparatedByCommas()
         .Type("X,Y");
     parser.Add("--to", arguments->to, "goal, metres").Values(2).SeparatedByCommas().Type("X,Y");
-    parser.Add("--kind", arguments->kind, "short, min-link (few turns) or search (sees every point)")
+    parser
+        .Add("--kind", arguments->kind,
+             "short, min-link (fewest turns) or search (sees all that can be seen)")
         .OneOf({"short", "min-link", "search"})
         .ShowDefault();
     parser.Add("--svg", arguments->svg, "also draw it").Type("FILE.svg");

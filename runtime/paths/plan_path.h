@@ -11,11 +11,10 @@ namespace cairn {
 struct PlanPathOptions {
   // Radius of the robot, metres.  REQUIRES: >= 0
   double radius_m = 0.2;
-  // About how many regions have their middles as turning and looking places: the largest of each cell of a
-  // grid over the plan.  REQUIRES: >= 1
+  // Search paths: about how many regions have their middles as looking places to choose from: the largest of
+  // each cell of a grid over the plan.  REQUIRES: >= 1
   int max_num_places = 1500;
-  // Search paths: share of the area that can be seen at all, counted by cells of that grid.
-  // REQUIRES: in (0, 1]
+  // Search paths: share of the area that can be seen at all.  REQUIRES: in (0, 1]
   double seen_ratio = 1;
 };
 OptionTable DescribeOptions(PlanPathOptions* options);
@@ -38,22 +37,24 @@ struct PlanPath {
 Result<PlanPath> FindPath(const PlanSpace& space, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                           const PlanPathOptions& options);
 
-// A path with few straight links: breadth first over the places seen from the start, then from those, and so
-// on, with turns in the middles of regions and around the corners of walls.  No path with turns at such
-// places only has fewer links; a path with turns elsewhere may.  Errors: as FindPath.
-Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Eigen::Vector2d& from,
-                                     const Eigen::Vector2d& to, const PlanPathOptions& options);
-
-struct SearchPath {
+struct MinimumLinkPath {
   PlanPath path;
-  std::vector<Eigen::Vector2d> places;  // to look around from, in the order of the path
-  double seen_area_m2 = 0, reachable_area_m2 = 0;
+  // No path has fewer: proven, up to the rounding of doubles.
+  int fewest_links = 0;
+  bool is_optimal() const { return path.num_links() == fewest_links; }
 };
-// A path from which every point is seen: looking places chosen greedily by the area that they add, visited in
-// the order of a tour that 2-opt has shortened.  A region counts as seen when its middle and its corners are;
-// in plans of more than max_num_places regions the largest of each cell stands for the others there.  Errors:
-// as FindPath.
-Result<SearchPath> FindSearchPath(const PlanSpace& space, const Eigen::Vector2d& from,
-                                  const PlanPathOptions& options);
+// A path with the fewest straight links, which may turn anywhere (fewest_links.h), and a proof of how few
+// they can be: the fewest of a robot that may go wherever this one may, and a little nearer to walls.  For a
+// point the path keeps a few units of the grid away from walls, or turns at their corners; for a disc, the
+// circle around a wall's end is a polygon outside of it for the path, and inside for the proof.  Where a way
+// of fewer links needs what lies between, the path is not optimal or is not known to be.  Errors: as
+// FindPath.
+Result<MinimumLinkPath> FindMinimumLinkPath(const PlanSpace& space, const Eigen::Vector2d& from,
+                                            const Eigen::Vector2d& to, const PlanPathOptions& options);
+
+// Errors: InvalidArgument for a place outside of the domain, NoData where the robot does not fit.
+Status CheckStands(const PlanSpace& space, const Eigen::Vector2d& place, double radius_m);
+// A path over these points.
+PlanPath MeasuredPath(std::vector<Eigen::Vector2d> points);
 
 }  // namespace cairn

@@ -7,6 +7,7 @@
 #include <queue>
 
 #include "core/geometry/vector_geometry.h"
+#include "runtime/paths/point_view.h"
 
 namespace cairn {
 namespace {
@@ -20,10 +21,6 @@ constexpr double kTurnStep = kPi / 8;
 constexpr double kRounding = 1e-9;
 
 Vec2 Direction(double angle) { return {std::cos(angle), std::sin(angle)}; }
-
-double AngleOf(const GridPoint& from, const GridPoint& to) {
-  return std::atan2(static_cast<double>(to.y - from.y), static_cast<double>(to.x - from.x));
-}
 
 }  // namespace
 
@@ -42,8 +39,8 @@ void PlanRoadmap::AddCorners() {
       continue;
     }
     // From the normal of the first wall to that of the last.
-    const double first = AngleOf(corners[i].vertex, corners[i].first);
-    double free_angle = AngleOf(corners[i].vertex, corners[i].last) - first;
+    const double first = AngleOf(Real(corners[i].first) - Real(corners[i].vertex));
+    double free_angle = AngleOf(Real(corners[i].last) - Real(corners[i].vertex)) - first;
     if (free_angle <= 0) free_angle += 2 * kPi;
     const int num_points = std::max(1, static_cast<int>(std::ceil((free_angle - kPi) / kTurnStep)));
     const double half_step = 0.5 * (free_angle - kPi) / num_points;
@@ -92,6 +89,12 @@ unsigned PlanRoadmap::SidesAt(const Node& node, const Vec2& towards, bool leaves
   }
   if (!leaves && sides != kEitherSide) sides ^= kEitherSide;
   return sides;
+}
+
+std::vector<Vec2> PlanRoadmap::Places(const std::vector<int>& nodes) const {
+  std::vector<Vec2> places;
+  for (const int node : nodes) places.push_back(place(node));
+  return places;
 }
 
 bool PlanRoadmap::AreJoined(int a, int b) const {

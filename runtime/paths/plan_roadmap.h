@@ -29,6 +29,7 @@ class PlanRoadmap {
 
   int num_nodes() const { return static_cast<int>(nodes_.size()); }
   const Eigen::Vector2d& place(int node) const { return nodes_[node].place; }
+  std::vector<Eigen::Vector2d> Places(const std::vector<int>& nodes) const;
   // Whether the robot may go straight from one to the other.
   bool AreJoined(int a, int b) const;
   // The nodes of the shortest way; empty: there is none.  A* with the straight distance.

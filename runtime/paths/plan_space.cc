@@ -163,8 +163,8 @@ void PlanSpace::ListCorners() {
       const Arm &first = arms[i], &last = arms[(i + 1) % arms.size()];
       // In closed plans the domain lies left of walls.
       if (plan.closed && !first.leaves) continue;
-      if (arms.size() == 1 || Orientation(vertex, first.end, last.end) < 0)
-        corners_.push_back({vertex, first.end, last.end});
+      gaps_.push_back({vertex, first.end, last.end});
+      if (arms.size() == 1 || Orientation(vertex, first.end, last.end) < 0) corners_.push_back(gaps_.back());
     }
   }
 }

@@ -24,9 +24,8 @@ std::vector<Point> Tightened(const std::vector<Point>& points, const IsFree& is_
   return tight;
 }
 
-// A corner of walls that juts out into the domain: the free space at a vertex, from the wall towards `first`
-// counter-clockwise to the one towards `last`, if it is more than 180 degrees.  Only at such corners does a
-// shortest path turn.  At an end that stands free, `first` and `last` are the same.
+// The free space of the domain at a vertex between two neighbouring walls, from the wall towards `first`
+// counter-clockwise to the one towards `last`.  At an end that stands free, `first` and `last` are the same.
 struct WallCorner {
   GridPoint vertex, first, last;
 };
@@ -76,7 +75,9 @@ class PlanSpace {
   Passage PassageBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   // Distance to the nearest wall.  O(walls).
   double Clearance(const Eigen::Vector2d& place) const;
-  // In the order of their vertices.
+  // All, in the order of their vertices.
+  const std::vector<WallCorner>& gaps() const { return gaps_; }
+  // Those of more than 180 degrees, where walls jut out into the domain: a shortest path turns nowhere else.
   const std::vector<WallCorner>& corners() const { return corners_; }
 
   // A way into a neighbouring region.
@@ -107,7 +108,7 @@ class PlanSpace {
   FaceLocator locator_;
   std::vector<int64_t> neighbour_offsets_;
   std::vector<Neighbour> neighbours_;
-  std::vector<WallCorner> corners_;
+  std::vector<WallCorner> gaps_, corners_;
   // Pieces of walls by the cells of a grid that they lie in.
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   double cell_m_ = 1;

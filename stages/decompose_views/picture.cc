@@ -43,6 +43,7 @@ class Picture {
     svg_.Begin(width_ + kLegendPx,
                std::max(height_ + 40, 160.0 + 18.0 * static_cast<double>(overlay.captions.size())), 13);
     if (regions) DrawRegions();
+    DrawAreas(overlay);
     DrawWalls();
     DrawOverlay(overlay);
     svg_.Append(ScaleBar(kMarginPx, height_ + 8, frame_.px_per_m, 240));
@@ -95,6 +96,19 @@ class Picture {
                  b.y());
     }
     svg_.Write("</g>\n");
+  }
+
+  void DrawAreas(const ViewsOverlay& overlay) {
+    if (overlay.areas.empty()) return;
+    // Stroked too: no gaps between neighbours.
+    svg_.Write("<path id=\"areas\" fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1\" d=\"",
+               kSvgPurple);
+    for (const std::vector<Vec2>& area : overlay.areas) {
+      for (size_t i = 0; i < area.size(); ++i)
+        svg_.Write("{}{:.1f} {:.1f}", i == 0 ? "M" : "L", Px(area[i]).x(), Px(area[i]).y());
+      svg_.Write("Z");
+    }
+    svg_.Write("\"/>\n");
   }
 
   // What a scan saw: the area that its beams passed, and where they ended.

@@ -26,6 +26,7 @@ struct ViewsOverlay {
   std::vector<std::pair<Eigen::Vector2d, bool>> beams;
   std::vector<Line> segments;                       // of a scan
   std::vector<std::vector<Eigen::Vector2d>> paths;  // polylines, an arrow at the end of each
+  std::vector<std::vector<Eigen::Vector2d>> areas;  // polygons, shaded
   std::vector<std::string> captions;                // lines of the legend
 };
 

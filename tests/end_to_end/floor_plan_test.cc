@@ -73,8 +73,26 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   const ProgramRun path = Run("plan path views.db --from 1,1 --to 5,1");
   ASSERT_EQ(path.exit_code, 0) << path.err;
   EXPECT_GT(json::parse(path.out)["length_m"].get<double>(), 4);
-  const ProgramRun search = Run("plan path views.db --from 1,1 --kind search");
+  const ProgramRun few = Run("plan path views.db --from 0.5,0.5 --to 5,0.5 --kind min-link --svg few.svg");
+  ASSERT_EQ(few.exit_code, 0) << few.err;
+  EXPECT_EQ(json::parse(few.out)["links"], 2);
+  EXPECT_EQ(json::parse(few.out)["fewest_links"], 2);
+  EXPECT_EQ(json::parse(few.out)["is_optimal"], true);
+  EXPECT_THAT(*ReadFile(Path("few.svg")), HasSubstr("no path has fewer links"));
+  // From one room: the other is seen through the door, but not its corners; around the flat nobody looks.
+  const ProgramRun search = Run("plan path views.db --from 1,1 --kind search --svg search.svg");
   ASSERT_EQ(search.exit_code, 0) << search.err;
+  const json found = json::parse(search.out);
+  EXPECT_EQ(found["places"].size(), 2u);
+  EXPECT_EQ(found["fewest_places"], 2);
+  EXPECT_NEAR(found["domain_area_m2"].get<double>(), 8 * 6, 1e-6);
+  EXPECT_NEAR(found["visible_area_m2"].get<double>(), 24, 1e-3);
+  EXPECT_NEAR(found["seen_area_m2"].get<double>(), 24, 1e-3);
+  ASSERT_EQ(found["unseen"].size(), 1u);
+  EXPECT_NEAR(found["unseen"][0]["area_m2"].get<double>(), 24, 1e-3);
+  EXPECT_NEAR(found["unseen_area_m2"].get<double>(), 24, 1e-3);
+  EXPECT_THAT(search.err, HasSubstr("24.0 of 48.0 m2 cannot be seen from where the robot gets to"));
+  EXPECT_THAT(*ReadFile(Path("search.svg")), HasSubstr("id=\"areas\""));
   const ProgramRun apart = Run("plan tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
   ASSERT_EQ(apart.exit_code, 0) << apart.err;
   EXPECT_GT(json::parse(apart.out)["case"].get<int>(), 0);
@@ -346,6 +364,8 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan path views.db --from nan,1 --to 1,1", 2, "no region"},
            Case{"plan path views.db --from 1,1 --to 5,1 --radius-m nan", 2, "radius_m"},
            Case{"plan path views.db --from 1,1 --to 5,1 --kind search", 2, "leave --to out"},
+           Case{"plan path views.db --from 1,1 --to 5,1 --kind min-link --max-num-places 9", 2,
+                "--kind search"},
            Case{"plan tell-apart views.db --a 1,2,0 --b 5,2,nan", 2, "--b 5,2,nan: the heading"},
            Case{"plan tell-apart views.db --a 1,2,361 --b 5,2,0", 2, "--a 1,2,361: the heading"},
            Case{"plan tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},

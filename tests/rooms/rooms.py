@@ -17,7 +17,7 @@ import sys
 ORDER = """
 core/base core/files core/modules core/images core/options core/geometry core/picture core/sift core/features core/learned core/work core/camera core/vocabulary core/colmap core/feature_files core/structure
 core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/delta core/atlas core/line core/view_regions
-runtime/map runtime/localize runtime/track runtime/scans runtime/laser runtime/beams runtime/belief runtime/paths runtime/visual_map runtime/drive runtime/atlas runtime/robot_log runtime/c_api runtime/c_api/plans
+runtime/map runtime/localize runtime/track runtime/scans runtime/laser runtime/beams runtime/belief runtime/paths runtime/looks runtime/visual_map runtime/drive runtime/atlas runtime/robot_log runtime/c_api runtime/c_api/plans
 sim/render sim/survey sim/robot sim/worlds
 stages/simulate
 stages/extract_features

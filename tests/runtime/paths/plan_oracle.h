@@ -89,6 +89,51 @@ class PlanOracle {
     return ShortestOver(places, radius_m);
   }
 
+  // A lattice of places over the domain, none of them nearer than `clearance_m` to a wall.
+  std::vector<Vec2> Lattice(double step_m, double clearance_m) const {
+    std::vector<Vec2> places;
+    for (double x = low_.x() + 0.41 * step_m; x < high_.x(); x += step_m) {
+      for (double y = low_.y() + 0.37 * step_m; y < high_.y(); y += step_m) {
+        if (IsClear({x, y}, {x, y}, clearance_m)) places.emplace_back(x, y);
+      }
+    }
+    return places;
+  }
+
+  // The fewest links of a path with turns at these places, which keeps `clearance_m` from walls; none: there
+  // is none.
+  std::optional<int> FewestLinks(const Vec2& from, const Vec2& to, std::vector<Vec2> turns,
+                                 double clearance_m) const {
+    std::vector<Vec2> now{from};
+    for (int num_links = 1; !now.empty(); ++num_links) {
+      std::vector<Vec2> next;
+      for (const Vec2& at : now) {
+        if (IsClear(at, to, clearance_m)) return num_links;
+        const auto seen = std::stable_partition(
+            turns.begin(), turns.end(), [&](const Vec2& turn) { return !IsClear(at, turn, clearance_m); });
+        next.insert(next.end(), seen, turns.end());
+        turns.erase(seen, turns.end());
+      }
+      now = std::move(next);
+    }
+    return std::nullopt;
+  }
+
+  // Those of these places that are reached from one, from place to place.
+  std::vector<Vec2> ReachedOf(const Vec2& from, std::vector<Vec2> places, double clearance_m) const {
+    std::vector<Vec2> reached{from};
+    for (size_t i = 0; i < reached.size(); ++i) {
+      const auto seen = std::stable_partition(places.begin(), places.end(), [&](const Vec2& place) {
+        return !IsClear(reached[i], place, clearance_m);
+      });
+      reached.insert(reached.end(), seen, places.end());
+      places.erase(seen, places.end());
+    }
+    return reached;
+  }
+
+  bool Sees(const Vec2& place, const Vec2& point) const { return IsClear(place, point, 0); }
+
   // Whether a point can follow a path by less than a hair's breadth without touching a wall.
   bool CanBeWalked(const std::vector<Vec2>& points) const {
     std::vector<Vec2> reached{points[0]};

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/paths/search_path.h"
 #include "tests/decompose_views/plan_fixture.h"
 
 namespace cairn {
@@ -42,7 +43,7 @@ TEST(PlanPath, WhatIsSeenIsReachedStraight) {
   const Views views = decompose_views::Decomposed(kHook).views;
   const PlanSpace space(views);
   EXPECT_EQ(FindPath(space, {1, 1}, {5, 2}, {})->num_links(), 1);
-  EXPECT_EQ(FindMinimumLinkPath(space, {1, 1}, {5, 2}, {})->num_links(), 1);
+  EXPECT_EQ(FindMinimumLinkPath(space, {1, 1}, {5, 2}, {})->path.num_links(), 1);
 }
 
 TEST(PlanPath, TheFewestLinksAroundTheWallAreTwo) {
@@ -50,8 +51,9 @@ TEST(PlanPath, TheFewestLinksAroundTheWallAreTwo) {
   const PlanSpace space(views);
   const auto path = FindMinimumLinkPath(space, {2, 1}, {2, 5}, {.radius_m = 0.1});
   ASSERT_TRUE(path.ok());
-  EXPECT_EQ(path->num_links(), 2);
-  ExpectFree(space, *path, 0.1);
+  EXPECT_EQ(path->path.num_links(), 2);
+  EXPECT_EQ(path->fewest_links, 2);
+  ExpectFree(space, path->path, 0.1);
 }
 
 TEST(PlanPath, SaysWhereNoWayIs) {
@@ -66,27 +68,6 @@ TEST(PlanPath, SaysWhereNoWayIs) {
             ErrorCode::kNoData);
 }
 
-TEST(PlanPath, ASearchPathSeesEveryRoom) {
-  const Views views =
-      decompose_views::Decomposed(
-          decompose_views::PolygonText({{{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 4}, {6, 4}, {6, 6}, {0, 6}}}))
-          .views;
-  const PlanSpace space(views);
-  const auto search = FindSearchPath(space, {5, 1}, {.radius_m = 0.1});
-  ASSERT_TRUE(search.ok());
-  EXPECT_NEAR(search->seen_area_m2, search->reachable_area_m2, 1e-6);
-  EXPECT_NEAR(search->reachable_area_m2, 36 - 8, 0.01 * 36);
-  ExpectFree(space, search->path, 0.1);
-  // Every random point of the upper arm is seen from one of the places.
-  for (double x = 2.3; x < 6; x += 0.7) {
-    for (double y = 4.2; y < 6; y += 0.4) {
-      EXPECT_TRUE(std::any_of(search->places.begin(), search->places.end(), [&](const Vec2& place) {
-        return space.IsFree(place, {x, y}, 0);
-      }));
-    }
-  }
-}
-
 // Lengths of the shortest path of a point and number of links of the path of few links; -1: no way.
 std::pair<double, int> PointPaths(const std::string& walls, const Vec2& from, const Vec2& to) {
   const Views views = decompose_views::Decomposed(walls).views;
@@ -97,7 +78,7 @@ std::pair<double, int> PointPaths(const std::string& walls, const Vec2& from, co
   if (!path.ok()) {
     EXPECT_EQ(path.error().code, ErrorCode::kNoData) << path.error().message;
   }
-  return {path.ok() ? path->length_m : -1, few_links.ok() ? few_links->num_links() : -1};
+  return {path.ok() ? path->length_m : -1, few_links.ok() ? few_links->path.num_links() : -1};
 }
 
 TEST(PlanPath, APointPassesNoJoint) {
@@ -191,12 +172,15 @@ TEST(PlanPath, FromAPlaceToItselfIsNoLink) {
   const Views views = decompose_views::Decomposed(kHook).views;
   const PlanSpace space(views);
   for (const double radius : {0.0, 0.3}) {
-    for (const auto& path : {FindPath(space, {1, 1}, {1, 1}, {.radius_m = radius}),
-                             FindMinimumLinkPath(space, {1, 1}, {1, 1}, {.radius_m = radius})}) {
-      ASSERT_TRUE(path.ok());
-      EXPECT_EQ(path->points, std::vector<Vec2>{Vec2(1, 1)});
-      EXPECT_EQ(path->length_m, 0);
-      EXPECT_EQ(path->num_links(), 0);
+    const auto short_path = FindPath(space, {1, 1}, {1, 1}, {.radius_m = radius});
+    const auto few_links = FindMinimumLinkPath(space, {1, 1}, {1, 1}, {.radius_m = radius});
+    ASSERT_TRUE(short_path.ok());
+    ASSERT_TRUE(few_links.ok());
+    EXPECT_TRUE(few_links->is_optimal());
+    for (const PlanPath& path : {*short_path, few_links->path}) {
+      EXPECT_EQ(path.points, std::vector<Vec2>{Vec2(1, 1)});
+      EXPECT_EQ(path.length_m, 0);
+      EXPECT_EQ(path.num_links(), 0);
     }
   }
 }

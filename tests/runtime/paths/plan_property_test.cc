@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/paths/plan_path.h"
+#include "runtime/paths/search_path.h"
 #include "tests/decompose_views/plan_fixture.h"
 #include "tests/runtime/paths/plan_oracle.h"
 
@@ -25,19 +26,22 @@ Vec2 RandomPlace(Random& random, int size) {
 }
 
 // Either both kinds find a way or neither does; what they find starts and ends where it should.
-void ExpectSameWay(const Result<PlanPath>& path, const Result<PlanPath>& few_links, const Vec2& from,
+void ExpectSameWay(const Result<PlanPath>& path, const Result<MinimumLinkPath>& found, const Vec2& from,
                    const Vec2& to) {
-  ASSERT_EQ(path.ok(), few_links.ok());
+  ASSERT_EQ(path.ok(), found.ok());
   if (!path.ok()) {
-    EXPECT_EQ(path.error().code, few_links.error().code);
+    EXPECT_EQ(path.error().code, found.error().code);
     return;
   }
+  const PlanPath& few_links = found->path;
   EXPECT_EQ(path->points.front(), from);
   EXPECT_EQ(path->points.back(), to);
-  EXPECT_EQ(few_links->points.front(), from);
-  EXPECT_EQ(few_links->points.back(), to);
-  EXPECT_LE(few_links->num_links(), path->num_links());
-  EXPECT_LE(path->length_m, few_links->length_m + 1e-6);
+  EXPECT_EQ(few_links.points.front(), from);
+  EXPECT_EQ(few_links.points.back(), to);
+  EXPECT_LE(few_links.num_links(), path->num_links());
+  EXPECT_LE(found->fewest_links, few_links.num_links());
+  EXPECT_GE(path->length_m, (to - from).norm() - 1e-9);
+  EXPECT_LE(path->length_m, few_links.length_m + 1e-6);
 }
 
 TEST(PlanProperty, APointGoesTheShortestWayThatBruteForceFinds) {
@@ -64,7 +68,7 @@ TEST(PlanProperty, APointGoesTheShortestWayThatBruteForceFinds) {
       if (!shortest) continue;
       EXPECT_NEAR(path->length_m, *shortest, 1e-3);
       EXPECT_TRUE(oracle.CanBeWalked(path->points));
-      EXPECT_TRUE(oracle.CanBeWalked(few_links->points));
+      EXPECT_TRUE(oracle.CanBeWalked(few_links->path.points));
       ++num_ways;
       num_turns += path->num_links() - 1;
     }
@@ -90,7 +94,8 @@ TEST(PlanProperty, ADiscGoesTheShortestWayUpToItsPolygon) {
                                          to.x(), to.y(), radius, oracle.Text());
     SCOPED_TRACE(what);
     const auto path = FindPath(space, from, to, {.radius_m = radius});
-    ExpectSameWay(path, FindMinimumLinkPath(space, from, to, {.radius_m = radius}), from, to);
+    const auto few_links = FindMinimumLinkPath(space, from, to, {.radius_m = radius});
+    ExpectSameWay(path, few_links, from, to);
     const bool fits = oracle.Clearance(from, from) >= radius && oracle.Clearance(to, to) >= radius;
     if (!fits) {
       ASSERT_FALSE(path.ok());
@@ -100,6 +105,9 @@ TEST(PlanProperty, ADiscGoesTheShortestWayUpToItsPolygon) {
     if (path.ok()) {
       for (size_t i = 0; i + 1 < path->points.size(); ++i)
         EXPECT_GE(oracle.Clearance(path->points[i], path->points[i + 1]), radius - 1e-6);
+      const std::vector<Vec2>& turns = few_links->path.points;
+      for (size_t i = 0; i + 1 < turns.size(); ++i)
+        EXPECT_GE(oracle.Clearance(turns[i], turns[i + 1]), radius - 1e-6);
       const std::optional<double> shortest = oracle.ShortestLength(from, to, radius * 0.998);
       ASSERT_TRUE(shortest.has_value());
       EXPECT_GT(path->length_m, *shortest - 0.01);
@@ -128,7 +136,6 @@ TEST(PlanProperty, ASearchReachesWhatAShortPathReaches) {
     if (space.FaceAt(from) < 0) continue;
     SCOPED_TRACE(fmt::format("seed {}: {},{}\n{}", seed, from.x(), from.y(), oracle.Text()));
     PlanPathOptions options{.radius_m = 0};
-    options.max_num_places = 100000;
     const auto search = FindSearchPath(space, from, options);
     ASSERT_TRUE(search.ok()) << search.error().message;
     EXPECT_TRUE(oracle.CanBeWalked(search->path.points));
@@ -137,7 +144,11 @@ TEST(PlanProperty, ASearchReachesWhatAShortPathReaches) {
       area += views.Area(face);
       if (FindPath(space, from, views.Centroid(face), options).ok()) reached += views.Area(face);
     }
-    EXPECT_NEAR(search->reachable_area_m2, reached, 1e-6 * area);
+    // A point sees all that it gets to.
+    EXPECT_NEAR(search->domain_area_m2, area, 1e-6 * area);
+    EXPECT_NEAR(search->visible_area_m2, reached, 1e-6 * area);
+    EXPECT_NEAR(search->unreached_area_m2, area - reached, 1e-6 * area);
+    EXPECT_NEAR(search->seen_area_m2, reached, 1e-3 * area);
     num_partly += reached < 0.999 * area;
   }
   EXPECT_GE(num_partly, 10);

@@ -1,4 +1,4 @@
-#include "runtime/paths/surveyed_looks.h"
+#include "runtime/looks/surveyed_looks.h"
 
 #include <algorithm>
 #include <cmath>

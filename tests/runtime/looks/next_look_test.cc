@@ -1,4 +1,4 @@
-#include "runtime/paths/next_look.h"
+#include "runtime/looks/next_look.h"
 
 #include <cmath>
 #include <numbers>
@@ -10,8 +10,8 @@
 #include "core/blocks/map_head.h"
 #include "core/blocks/map_rows.h"
 #include "core/geometry/pose.h"
+#include "runtime/looks/surveyed_looks.h"
 #include "runtime/map/map.h"
-#include "runtime/paths/surveyed_looks.h"
 #include "tests/decompose_views/plan_fixture.h"
 
 namespace cairn {

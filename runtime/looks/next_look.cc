@@ -1,4 +1,4 @@
-#include "runtime/paths/next_look.h"
+#include "runtime/looks/next_look.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include "core/geometry/pose.h"
 #include "runtime/beams/plan_rays.h"
 #include "runtime/beams/scan_locator.h"
-#include "runtime/paths/surveyed_looks.h"
+#include "runtime/looks/surveyed_looks.h"
 
 namespace cairn {
 namespace {

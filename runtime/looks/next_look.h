@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-class SurveyedLooks;  // runtime/paths/surveyed_looks.h
+class SurveyedLooks;  // runtime/looks/surveyed_looks.h
 
 struct NextLookOptions {
   // Radius of the robot, metres; less at a pose where it would not fit, as it stands there.  REQUIRES: >= 0
