@@ -221,6 +221,11 @@ std::vector<BlockedArc> LinkSpace::TouchingView(const Vec2& place, const Corner*
 }
 
 double LinkSpace::Reach(const Corner& corner, const std::vector<BlockedArc>& view, double angle) const {
+  // Along the corner's own sides a link is no window, and rounding could take it inside.
+  constexpr double kAlong = 1e-8;
+  const double turn = TurnTo(corner.from, angle);
+  if (turn < kAlong || turn > 2 * std::numbers::pi - kAlong || std::abs(turn - corner.free_angle) < kAlong)
+    return 0;
   const auto arc = FirstArcFrom(view, angle);
   double reach = arc == view.end() || arc->from > angle ? 0 : arc->Distance(angle);
   if (!touches_) return reach;
