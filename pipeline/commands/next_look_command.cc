@@ -32,7 +32,7 @@ constexpr int kMaxNumDrawn = 6;
 struct NextLookArguments {
   std::string plan;
   std::string places;
-  std::optional<int> scan;  // otherwise the last line
+  std::optional<std::string> scan;  // otherwise the last line
   bool camera = false;
   std::vector<double> laser;  // empty: at the camera
   std::string svg;
@@ -80,6 +80,11 @@ Result<std::vector<PossiblePlace>> ParsePlaces(const json& line, const std::stri
 
 // Of the chosen scan, or of the last line.  Errors: those of ReadFile; InvalidArgument.
 Result<std::vector<PossiblePlace>> ReadPlaces(const NextLookArguments& arguments) {
+  int64_t wanted = 0;
+  if (arguments.scan && !ParseNumber(*arguments.scan, &wanted)) {
+    return MakeError(ErrorCode::kInvalidArgument, "--scan '{}': expected the number of a scan, from 0",
+                     *arguments.scan);
+  }
   std::string text;
   if (arguments.places == "-") {
     text.assign(std::istreambuf_iterator<char>(std::cin), {});
@@ -100,8 +105,7 @@ Result<std::vector<PossiblePlace>> ReadPlaces(const NextLookArguments& arguments
     }
     if (arguments.scan) {
       const auto scan = parsed.find("scan");
-      if (scan == parsed.end() || !scan->is_number_integer() || scan->get<int64_t>() != *arguments.scan)
-        continue;
+      if (scan == parsed.end() || !scan->is_number_integer() || scan->get<int64_t>() != wanted) continue;
     }
     chosen = std::move(parsed);
     where = fmt::format("{}:{}", file, number);
@@ -245,8 +249,9 @@ Command NextLookCommand() {
         .Required()
         .Type("FILE");
     parser.Add("--scan", arguments->scan, "the line of this scan [the last line]").Type("INT");
-    parser.Add("--camera", arguments->camera,
-               "the robot also has a camera, like the survey's: count on what images of the map would tell");
+    parser.AddFlag(
+        "--camera", arguments->camera,
+        "the robot also has a camera, like the survey's: count on what images of the map would tell");
     parser
         .Add("--laser-in-camera", arguments->laser,
              "where the laser is: metres ahead and to the left of the camera, degrees to the left")

@@ -376,6 +376,7 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan next-look views.db none.json", 3, "none.json"},
            Case{"plan next-look views.db bare.json", 2, "bare.json:2: no list of"},
            Case{"plan next-look views.db place.json --scan 4", 2, "place.json: no line of scan 4"},
+           Case{"plan next-look views.db place.json --scan nan", 2, "--scan 'nan'"},
            Case{"plan next-look views.db lame.json", 2, "places[1] lacks one of the numbers"},
            Case{"plan next-look views.db wide.json", 2, "places[0]: its covariance has not 9 numbers"},
            Case{"plan next-look views.db place.json --camera", 14, "--camera needs a map"},

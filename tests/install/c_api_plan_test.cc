@@ -15,6 +15,8 @@
 #include "runtime/beams/scan_locator.h"
 #include "runtime/belief/robot_on_plan.h"
 #include "runtime/c_api/cairn.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/map/map.h"
 #include "runtime/map/open_views.h"
 #include "tests/install/c_image.h"
 #include "tests/install/laser_room.h"
