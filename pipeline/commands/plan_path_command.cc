@@ -56,7 +56,7 @@ void AddSearch(const SearchPath& search, ordered_json* line, decompose_views::Vi
       fmt::format("{} are needed at least", search.fewest_places),
       fmt::format("seen: {:.1f} of {:.1f} m²", search.seen_area_m2, search.domain_area_m2),
       fmt::format("{:.1f} m² cannot be seen (shaded)", search.unseen_area_m2()),
-      fmt::format("the robot's middle cannot get to {:.1f} m²", search.unreached_area_m2),
+      fmt::format("{:.1f} m² are out of its reach", search.unreached_area_m2),
   };
 }
 

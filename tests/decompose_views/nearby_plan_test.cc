@@ -80,7 +80,7 @@ TEST(PlanNear, WhatALaserSeesNearAPlaceIsWhatItSeesInTheWholePlan) {
     ASSERT_TRUE(derived.ok()) << derived.error().message;
     const FaceLocator locator(derived->views);
     int num_seen = 0;
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < 400; ++i) {
       const Vec2 at = places[i % 2] + Vec2(random.Uniform(-0.7, 0.7), random.Uniform(-0.7, 0.7));
       const double angle = random.Uniform(0, 2 * std::numbers::pi);
       const Vec2 direction(std::cos(angle), std::sin(angle));

@@ -82,15 +82,15 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   // From one room: the other is seen through the door, but not its corners; around the flat nobody looks.
   const ProgramRun search = Run("plan path views.db --from 1,1 --kind search --svg search.svg");
   ASSERT_EQ(search.exit_code, 0) << search.err;
-  const json found = json::parse(search.out);
-  EXPECT_EQ(found["places"].size(), 2u);
-  EXPECT_EQ(found["fewest_places"], 2);
-  EXPECT_NEAR(found["domain_area_m2"].get<double>(), 8 * 6, 1e-6);
-  EXPECT_NEAR(found["visible_area_m2"].get<double>(), 24, 1e-3);
-  EXPECT_NEAR(found["seen_area_m2"].get<double>(), 24, 1e-3);
-  ASSERT_EQ(found["unseen"].size(), 1u);
-  EXPECT_NEAR(found["unseen"][0]["area_m2"].get<double>(), 24, 1e-3);
-  EXPECT_NEAR(found["unseen_area_m2"].get<double>(), 24, 1e-3);
+  const json searched = json::parse(search.out);
+  EXPECT_EQ(searched["places"].size(), 2u);
+  EXPECT_EQ(searched["fewest_places"], 2);
+  EXPECT_NEAR(searched["domain_area_m2"].get<double>(), 8 * 6, 1e-6);
+  EXPECT_NEAR(searched["visible_area_m2"].get<double>(), 24, 1e-3);
+  EXPECT_NEAR(searched["seen_area_m2"].get<double>(), 24, 1e-3);
+  ASSERT_EQ(searched["unseen"].size(), 1u);
+  EXPECT_NEAR(searched["unseen"][0]["area_m2"].get<double>(), 24, 1e-3);
+  EXPECT_NEAR(searched["unseen_area_m2"].get<double>(), 24, 1e-3);
   EXPECT_THAT(search.err, HasSubstr("24.0 of 48.0 m2 cannot be seen from where the robot gets to"));
   EXPECT_THAT(*ReadFile(Path("search.svg")), HasSubstr("id=\"areas\""));
   const ProgramRun apart = Run("plan tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
