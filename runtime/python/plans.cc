@@ -263,7 +263,8 @@ void BindPlans(py::module_& module) {
                            pose.position.y(), DegFromRad(pose.heading_rad), self.place.probability);
       });
   py::class_<PyLocatedScan>(module, "LocatedScan")
-      .def_readonly("places", &PyLocatedScan::places)
+      // Copies: what only refers to another object counts as not constructed (ConstructedCaster).
+      .def_property_readonly("places", [](const PyLocatedScan& self) { return self.places; })
       .def_readonly("is_complete", &PyLocatedScan::is_complete)
       .def("__repr__", [](const PyLocatedScan& self) {
         return fmt::format("<cairn.LocatedScan of {} places>", self.places.size());
