@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "bench/views/scan_places.h"
+#include "bench/views/simulated_laser.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/view_regions/derive_views.h"
@@ -30,25 +31,11 @@ namespace {
 using namespace cairn;
 using Vec2 = Eigen::Vector2d;
 
-constexpr double kRangeM = 5, kRangeSigmaM = 0.02, kHidden = 0.05, kWheelsErr = 0.03;
+constexpr double kWheelsErr = 0.03;
 constexpr double kSure = 0.99, kScanEveryM = 0.5, kRadiusM = 0.2, kMostM = 60, kReplanM = 2;
-constexpr int kNumBeams = 180;
 constexpr std::array<const char*, 3> kPlanners = {"next look of n", "two poses", "at random"};
 
-ScanView ScanAt(const PlanRays& rays, const PlanarPose& pose, Random* random) {
-  RangeScan scan;
-  scan.first_angle_rad = -std::numbers::pi / 2;
-  scan.step_rad = std::numbers::pi / kNumBeams;
-  scan.max_range_m = kRangeM;
-  for (int i = 0; i < kNumBeams; ++i) {
-    const double angle = pose.heading_rad + scan.first_angle_rad + i * scan.step_rad;
-    const PlanRays::Hits hits = rays.Cast(pose.position, {std::cos(angle), std::sin(angle)}, kRangeM);
-    double range = hits.size == 0 ? kRangeM : hits.at[0].distance_m + random->Normal(0, kRangeSigmaM);
-    if (random->Uniform(0, 1) < kHidden) range *= random->Uniform(0.3, 1);
-    scan.ranges_m.push_back(std::clamp(range, 0.05, kRangeM));
-  }
-  return ViewOf(scan, {});
-}
+constexpr SimulatedLaser kLaser{.range_m = 5, .sigma_m = 0.02, .hidden_ratio = 0.05};
 
 bool IsSure(const PoseBelief& belief) {
   return !belief.places().empty() && belief.places()[0].probability >= kSure &&
@@ -107,7 +94,7 @@ class Robot {
     pose_ = next;
     See();
   }
-  void See() { (void)tracker_.SeeScan(ScanAt(rays_, pose_, &random_)); }
+  void See() { (void)tracker_.SeeScan(SimulatedScan(kLaser, rays_, pose_, &random_)); }
 
   const PlanSpace& space_;
   const PlanRays& rays_;
@@ -135,14 +122,14 @@ Drive DriveUntilSure(const PlanSpace& space, Robot robot, int planner) {
     const std::vector<PossiblePlace>& places = robot.belief().places();
     if (planner == 0) {
       const auto next =
-          PlanNextLook(space, places, nullptr, {.radius_m = kRadiusM, .view_range_m = kRangeM}, 1);
+          PlanNextLook(space, places, nullptr, {.radius_m = kRadiusM, .view_range_m = kLaser.range_m}, 1);
       if (next.ok() && next->outcome == NextLookOutcome::kFound) {
         path = next->path;
         heading = next->heading_rad;
       }
     } else if (planner == 1 && places.size() > 1) {
       const auto plan = PlanDisambiguation(space, places[0].pose, places[1].pose,
-                                           {.max_range_m = kRangeM, .radius_m = kRadiusM});
+                                           {.max_range_m = kLaser.range_m, .radius_m = kRadiusM});
       if (plan.ok() && plan->outcome == DisambiguationOutcome::kFound) {
         for (const Vec2& point : plan->path_a) path.push_back(places[0].pose.RobotFromFloor(point));
         const Vec2 towards =
@@ -293,10 +280,10 @@ int main(int argc, char** argv) {
       const PlanarPose pose{{x, y}, random.Uniform(-std::numbers::pi, std::numbers::pi)};
       if (!space.IsFree(pose.position, pose.position, 1.2 * kRadiusM)) continue;
       Random of_scan(seed);
-      const ScanView scan = ScanAt(rays, pose, &of_scan);
+      const ScanView scan = SimulatedScan(kLaser, rays, pose, &of_scan);
       const auto num_met =
           std::count_if(scan.beams.begin(), scan.beams.end(), [](const Beam& beam) { return beam.met; });
-      if (num_met < 2 * kNumBeams / 3) continue;
+      if (num_met < 2 * SimulatedLaser::kNumBeams / 3) continue;
       ++num_tried;
       Robot robot(space, rays, *tracker, pose, seed + static_cast<uint64_t>(num_tried));
       const auto& places = robot.belief().places();

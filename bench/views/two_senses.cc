@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench/views/scan_places.h"
+#include "bench/views/simulated_laser.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/blocks/map_head.h"
@@ -26,8 +27,7 @@ namespace {
 
 using namespace cairn;
 
-constexpr double kRangeM = 8, kRangeSigmaM = 0.01;
-constexpr double kHidden = 0.1;      // share of beams that end before the wall
+constexpr SimulatedLaser kLaser{.range_m = 8, .sigma_m = 0.01, .hidden_ratio = 0.1};
 constexpr double kWheelsErr = 0.03;  // of each way and turn
 constexpr int kNumMetres = 6;
 constexpr std::array<const char*, 3> kSenses = {"laser", "camera", "both"};
@@ -37,22 +37,6 @@ struct Look {
   ScanView scan;
   std::vector<PossiblePlace> places;  // by its image
 };
-
-ScanView ScanAt(const PlanRays& rays, const PlanarPose& pose, Random* random) {
-  RangeScan scan;
-  scan.first_angle_rad = -std::numbers::pi / 2;
-  scan.step_rad = std::numbers::pi / 180;
-  scan.max_range_m = kRangeM;
-  for (int i = 0; i < 180; ++i) {
-    const double angle = pose.heading_rad + scan.first_angle_rad + i * scan.step_rad;
-    const PlanRays::Hits hits = rays.Cast(pose.position, {std::cos(angle), std::sin(angle)}, kRangeM);
-    double range =
-        hits.begin() == hits.end() ? kRangeM : hits.begin()->distance_m + random->Normal(0, kRangeSigmaM);
-    if (random->Uniform(0, 1) < kHidden) range *= random->Uniform(0.3, 1);
-    scan.ranges_m.push_back(std::min(range, kRangeM));
-  }
-  return ViewOf(scan, {});
-}
 
 struct Count {
   int right = 0, wrong = 0, sure_right = 0, sure_wrong = 0, num = 0;
@@ -100,7 +84,7 @@ int main(int argc, char** argv) {
     const FloorPose camera = FloorPoseOf(*image.cam_from_world, (*map)->head().floor_from_world);
     look.pose = {camera.position, WrapAngle(RadFromDeg(camera.heading_deg))};
     Random random(static_cast<uint64_t>(i) + 1);
-    look.scan = ScanAt(rays, look.pose, &random);
+    look.scan = SimulatedScan(kLaser, rays, look.pose, &random);
     const auto grey = ReadGreyImage(std::string(argv[2]) + "/images/" + image.name);
     if (!grey.ok()) return;
     Localizer localizer(*map);

@@ -13,6 +13,7 @@
 #include "core/base/text.h"
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
+#include "pipeline/commands/path_json.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/looks/next_look.h"
 #include "runtime/looks/surveyed_looks.h"
@@ -27,7 +28,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 using Vec2 = Eigen::Vector2d;
 
-constexpr int kMaxNumDrawn = 6;
+constexpr int kMaxNumDrawnLooks = 6;
 
 struct NextLookArguments {
   std::string plan;
@@ -138,12 +139,6 @@ std::vector<Vec2> PathAt(const NextLook& next, const PlanarPose& pose) {
   return path;
 }
 
-ordered_json PathJson(const std::vector<Vec2>& points) {
-  ordered_json list = ordered_json::array();
-  for (const Vec2& point : points) list.push_back({point.x(), point.y()});
-  return list;
-}
-
 ordered_json LookJson(const NextLook& next) {
   ordered_json places = ordered_json::array();
   for (size_t i = 0; i < next.places.size(); ++i) {
@@ -174,7 +169,7 @@ ordered_json LookJson(const NextLook& next) {
 
 std::string Drawn(const Views& views, const NextLook& next) {
   decompose_views::ViewsOverlay overlay;
-  for (size_t i = 0; i < next.places.size() && i < kMaxNumDrawn; ++i) {
+  for (size_t i = 0; i < next.places.size() && i < kMaxNumDrawnLooks; ++i) {
     const PossiblePlace& place = next.places[i];
     overlay.robots.push_back({place.pose.position, place.pose.heading_rad,
                               fmt::format("{}: {:.0f} %", i + 1, 100 * place.probability)});

@@ -8,6 +8,7 @@
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "core/plan/views.h"
+#include "pipeline/commands/path_json.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/map/open_views.h"
 #include "runtime/paths/disambiguate.h"
@@ -20,12 +21,6 @@ namespace {
 
 using nlohmann::ordered_json;
 using Vec2 = Eigen::Vector2d;
-
-ordered_json PathJson(const std::vector<Vec2>& points) {
-  ordered_json list = ordered_json::array();
-  for (const Vec2& point : points) list.push_back({point.x(), point.y()});
-  return list;
-}
 
 struct PathArguments {
   std::string views;

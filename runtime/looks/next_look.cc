@@ -33,7 +33,7 @@ constexpr double kBySector = 4, kByBeam = kBySector * 30 / kNumBeams;
 constexpr double kByImage = 4, kRulesOut = 2;
 // A robot that stands nearer to a wall than it is wide keeps this share of its distance.
 constexpr double kOfClearance = 0.9;
-// Looks from which the second one is planned: the best by what they leave, of all ways to them.
+// First looks of which the way to the end is reckoned: the nearest, and those that leave least.
 constexpr int kMaxNumFirstLooks = 40;
 
 // Where a hypothesis is looked at whose place along some direction is not known: its middle first.
@@ -50,7 +50,6 @@ struct Place {
   Vec2 at = Vec2::Zero();
   double length = 0;
   int before = -1;
-  int column = 0, row = 0;
 };
 
 // What is known after a look: for each hypothesis, if it is the right one, those that are left.
@@ -141,7 +140,7 @@ class LookPlanner {
         continue;
       const Vec2 at = options_.step_m * Vec2(entry.column, entry.row);
       const int index = static_cast<int>(places_.size());
-      places_.push_back({at, entry.length, entry.before, entry.column, entry.row});
+      places_.push_back({at, entry.length, entry.before});
       for (int row = entry.row - 1; row <= entry.row + 1; ++row) {
         for (int column = entry.column - 1; column <= entry.column + 1; ++column) {
           if (known.contains({row, column})) continue;
@@ -309,7 +308,7 @@ class LookPlanner {
       if (Has(set, i))
         way += hypotheses_[i].probability / weight * ToTheEnd(best->left[i] & set, best->place);
     }
-    return to_the_end_[{set, from}] = way;
+    return known->second = way;
   }
 
   double Cost(const Look& look) {
@@ -334,20 +333,20 @@ class LookPlanner {
       return next;
     }
     // Looks in the order of the ways to them: those that leave less than all nearer ones.
-    std::vector<std::pair<double, const Look*>> first;
+    std::vector<const Look*> first;
     double least_left = std::numeric_limits<double>::infinity();
     for (const Look& look : looks_) {
       const double left = Confused(All(), &look);
       if (!(left < least_left - 1e-9)) continue;
       least_left = left;
-      first.emplace_back(left, &look);
+      first.push_back(&look);
     }
     // Many: the last ones leave least.
     if (std::ssize(first) > kMaxNumFirstLooks)
       first.erase(first.begin() + 1, first.end() - (kMaxNumFirstLooks - 1));
     double least = std::numeric_limits<double>::infinity();
     const Look* best = nullptr;
-    for (const auto& [left, look] : first) {
+    for (const Look* look : first) {
       if (places_[look->place].length >= least) break;
       const double cost = Cost(*look);
       if (!(cost < least - 1e-9)) continue;
