@@ -1,12 +1,18 @@
-// Writes the fuzzer's first inputs, made from the example of tests/emit_map:  make_fuzz_seeds
-// FOLDER GOLDEN_1.0
+// Writes the fuzzers' first inputs, made from the example of tests/emit_map:  make_fuzz_seeds
+// FOLDER GOLDEN_1.0 READERS      FOLDER: of map_fuzzer, READERS: of readers_fuzzer
 #include <cstdio>
 #include <string>
 
+#include "core/atlas/atlas_file.h"
 #include "core/base/blob.h"
+#include "core/base/progress.h"
+#include "core/delta/map_delta.h"
 #include "core/features/transform_code.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
+#include "core/plan/views_database.h"
+#include "core/seal/key_ring.h"
+#include "core/seal/signing_key.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
 
@@ -40,10 +46,58 @@ bool WritePacked(MapRows rows, const std::string& folder) {
   return WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok();
 }
 
+AtlasRows ExampleAtlas() {
+  AtlasRows atlas;
+  atlas.name = "campus";
+  atlas.epoch = 7;
+  atlas.maps.push_back({.name = "floor 1",
+                        .file = "floor1.cairn",
+                        .fingerprint = {1, 2, 3},
+                        .num_bytes = 100'000,
+                        .num_images = 40,
+                        .places = {{0, 1, 0xffffffff}, {}, {5, 1u << 31}}});
+  atlas.maps.push_back({.name = "floor 2", .file = "../floor2.cairn", .num_images = 9, .places = {{77}}});
+  atlas.look_alikes = {{{0, 39}, {1, 8}}};
+  atlas.passages = {{.name = "lift", .from = {0, 3}, .to = {1, 0}, .cost = 12.5}};
+  return atlas;
+}
+
+// What the stages leave for each other, and a delta, an atlas and keys, each behind the name of its reader.
+// The text files of tests/fuzz/readers are written by hand.
+bool WriteReaders(const EmitExample& example, const MapRows& rows, const std::string& folder) {
+  const std::string path = folder + "/written";
+  const auto keep = [&](const std::string& reader, const std::string& name, const Status& status) {
+    return status.ok() && WriteFileAtomically(folder + "/" + name, reader + "\n" + *ReadFile(path)).ok();
+  };
+  NoProgress progress;
+  bool is_whole =
+      keep("classes", "classes", WriteClasses(example.classes, path)) &&
+      keep("world", "world", WriteWorldDatabase(example.world, path)) &&
+      keep("world", "world_json", WriteWorldJson(example.world, path)) &&
+      keep("regions", "regions", WriteDecompositionDatabase(example.decomposition, path)) &&
+      keep("regions", "regions_json", WriteDecompositionJson(example.decomposition, path)) &&
+      keep("appearance", "appearance", WriteAppearance(example.appearance, path)) &&
+      keep("vocabulary", "vocabulary", WriteVocabulary(example.vocabulary, path)) &&
+      keep("views", "views",
+           WriteViews(MakeExampleViews(), path, progress, [](SQLite::Database&) { return Ok(); }));
+  AtlasRows atlas = ExampleAtlas();
+  const auto bytes = EncodeAtlas(std::nullopt, &atlas);
+  is_whole &= bytes.ok() && keep("atlas", "atlas", WriteFileAtomically(path, *bytes));
+  MapRows after = rows;
+  after.name = "after";
+  const std::string old_map = folder + "/old", new_map = folder + "/new";
+  is_whole &= WriteMapRows(rows, old_map).ok() && WriteMapRows(after, new_map).ok();
+  const auto delta = MakeMapDelta(old_map, new_map, std::nullopt);
+  is_whole &= delta.ok() && keep("delta", "delta", WriteFileAtomically(path, EncodeMapDelta(*delta)));
+  is_whole &= WriteFileAtomically(path, *ReadFile(old_map)).ok() && keep("seal", "seal", Ok());
+  for (const std::string& file : {path, old_map, new_map}) std::remove(file.c_str());
+  return is_whole;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) return std::fprintf(stderr, "usage: make_fuzz_seeds FOLDER map_1.0.cairn\n"), 2;
+  if (argc != 4) return std::fprintf(stderr, "usage: make_fuzz_seeds FOLDER map_1.0.cairn READERS\n"), 2;
   const std::string folder = argv[1];
   const EmitExample example = MakeEmitExample();
   for (const int min_num_landmarks_for_words : {0, 100}) {
@@ -64,6 +118,7 @@ int main(int argc, char** argv) {
     const std::string map = folder + (min_num_landmarks_for_words == 0 ? "/map_words" : "/map");
     if (min_num_landmarks_for_words == 0 && !WritePacked(*rows, folder)) return 1;
     if (!WriteMapRows(*rows, map).ok()) return 1;
+    if (min_num_landmarks_for_words == 0 && !WriteReaders(example, *rows, argv[3])) return 1;
     const auto file = MapFile::Open(map, {});
     if (!file.ok()) return 1;
     for (size_t i = 0; min_num_landmarks_for_words == 0 && i < file->directory().blocks().size(); ++i) {

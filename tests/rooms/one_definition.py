@@ -136,7 +136,8 @@ def definitions(source):
 
 
 def is_main(name):
-    return name.startswith("::main(")
+    """What a program begins with, or a fuzzer: one in each."""
+    return name.startswith(("::main(", "::LLVMFuzzerTestOneInput("))
 
 
 def sources(folder):
