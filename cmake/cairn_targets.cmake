@@ -28,21 +28,34 @@ function(cairn_stage name)
   set_property(GLOBAL APPEND PROPERTY CAIRN_STAGES cairn_${name})
 endfunction()
 
-# cairn_test(NAME SOURCES file... LIBS target... [LABEL slow]): the test program NAME; its tests are found by ctest.
+# cairn_test(NAME SOURCES file... LIBS target... [LABEL slow]): the test program NAME; ctest runs its suites, as NAME.Suite.
 function(cairn_test name)
   cmake_parse_arguments(ARG "" "LABEL" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main)
   target_precompile_headers(${name} REUSE_FROM cairn_test_headers)
+  cairn_unite(${name})
+  if(CMAKE_CROSSCOMPILING)
+    return()  # tests/arm64 runs them
+  endif()
   # Tests of one program may write files of one name: they run one after the other, in a folder of their own.
   set(folder ${CMAKE_BINARY_DIR}/tests_tmp/${name})
   file(MAKE_DIRECTORY ${folder})
-  set(labels)
+  set(properties "TIMEOUT 1200 RESOURCE_LOCK ${name} ENVIRONMENT TEST_TMPDIR=${folder}")
   if(ARG_LABEL)
-    set(labels LABELS ${ARG_LABEL})
+    string(APPEND properties " LABELS ${ARG_LABEL}")
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-    PROPERTIES ${labels} TIMEOUT 1200 RESOURCE_LOCK ${name} ENVIRONMENT TEST_TMPDIR=${folder})
+  set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
+  add_custom_command(TARGET ${name} POST_BUILD VERBATIM COMMENT "" COMMAND ${CMAKE_COMMAND} -D NAME=${name}
+    -D PROGRAM=$<TARGET_FILE:${name}> -D OUTPUT=${suites} -D "PROPERTIES=${properties}" -P ${PROJECT_SOURCE_DIR}/cmake/list_suites.cmake)
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake @ONLY CONTENT [[
+if(EXISTS "@suites@")
+  include("@suites@")
+else()
+  add_test("@name@" "not_built/@name@")
+endif()
+]])
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake)
 endfunction()
 
 # cairn_benchmark(NAME SOURCES file... LIBS target...): a Google Benchmark program.

@@ -12,7 +12,7 @@
 namespace cairn {
 namespace {
 
-constexpr double kMaxCoordinate = 2e9;  // 200 km in units of 0.1 mm
+constexpr double kMaxLandmarkCoordinate = 2e9;  // 200 km in units of 0.1 mm
 
 // The values that occur in the descriptors, ascending: with up to 2^bits of them, a value takes `bits` bits.
 struct DescriptorLevels {
@@ -114,7 +114,7 @@ bool ReadPositions(BlobReader* reader, std::vector<MapLandmark>* landmarks) {
     for (int axis = 0; axis < 3; ++axis) {
       int64_t coordinate = origin[axis];
       for (int byte = 0; byte < width; ++byte) coordinate += int64_t{reader->UInt8()} << (8 * byte);
-      if (std::abs(static_cast<double>(coordinate)) > kMaxCoordinate) return false;
+      if (std::abs(static_cast<double>(coordinate)) > kMaxLandmarkCoordinate) return false;
       landmark.position[axis] = DecodeLength(coordinate);
     }
   }

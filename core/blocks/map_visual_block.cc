@@ -41,7 +41,7 @@ bool IsAscending(const std::vector<double>& values) {
 }
 
 template <typename... Args>
-Error Invalid(fmt::format_string<Args...> format, Args&&... args) {
+Error InvalidVisual(fmt::format_string<Args...> format, Args&&... args) {
   return MakeError(ErrorCode::kInvalidArgument, "visual map: {}",
                    fmt::format(format, std::forward<Args>(args)...));
 }
@@ -53,18 +53,19 @@ std::array<float, 4> ValuesOf(const VisualErrors& errors) {
 Status CheckModel(const HeadingModel& model, size_t landmark, int64_t num_images) {
   if (model.shape.length < 0 || model.shape.length >= kNumKernelLengths || model.shape.noise < 0 ||
       model.shape.noise >= kNumKernelNoises) {
-    return Invalid("landmark {}: there is no kernel {}, {}", landmark, model.shape.length, model.shape.noise);
+    return InvalidVisual("landmark {}: there is no kernel {}, {}", landmark, model.shape.length,
+                         model.shape.noise);
   }
   if (!model.sigma.allFinite() || (model.sigma.array() < 0).any())
-    return Invalid("landmark {}: its errors are not valid numbers", landmark);
+    return InvalidVisual("landmark {}: its errors are not valid numbers", landmark);
   if (model.sights.size() < kMinNumSights || model.sights.size() > kMaxNumSights)
-    return Invalid("landmark {}: a model of {} sights, expected {} to {}", landmark, model.sights.size(),
-                   kMinNumSights, kMaxNumSights);
+    return InvalidVisual("landmark {}: a model of {} sights, expected {} to {}", landmark,
+                         model.sights.size(), kMinNumSights, kMaxNumSights);
   int64_t before = -1;
   for (const LandmarkSight& sight : model.sights) {
     if (sight.image <= before || sight.image >= num_images)
-      return Invalid("landmark {}: its images are not ascending below {}", landmark, num_images);
-    if (!sight.seen.allFinite()) return Invalid("landmark {}: a sight is not a valid number", landmark);
+      return InvalidVisual("landmark {}: its images are not ascending below {}", landmark, num_images);
+    if (!sight.seen.allFinite()) return InvalidVisual("landmark {}: a sight is not a valid number", landmark);
     before = sight.image;
   }
   return Ok();
@@ -131,22 +132,23 @@ Status RoundAsStored(VisualMapData* visual_map) {
 Status CheckVisualMap(const VisualMapData& visual_map, int64_t num_landmarks, int64_t num_images) {
   if (visual_map.landmarks.empty()) return Ok();
   if (static_cast<int64_t>(visual_map.landmarks.size()) != num_landmarks)
-    return Invalid("models of {} landmarks of {}", visual_map.landmarks.size(), num_landmarks);
+    return InvalidVisual("models of {} landmarks of {}", visual_map.landmarks.size(), num_landmarks);
   if (!(visual_map.focal_px >= 0 && visual_map.focal_px < 1e6F))
-    return Invalid("its focal length is not valid");
+    return InvalidVisual("its focal length is not valid");
   for (const float value : ValuesOf(visual_map.errors)) {
-    if (!(value >= 0 && value < 1e6F)) return Invalid("its errors are not valid numbers");
+    if (!(value >= 0 && value < 1e6F)) return InvalidVisual("its errors are not valid numbers");
   }
   const std::vector<double>& headings = visual_map.headings_deg;
   if (headings.empty() || headings.size() > kMaxNumHeadings || !(headings.front() >= 0) ||
       !(headings.back() < 360) || !IsAscending(headings)) {
-    return Invalid("its {} headings are not 1 to {} ascending ones", headings.size(), kMaxNumHeadings);
+    return InvalidVisual("its {} headings are not 1 to {} ascending ones", headings.size(), kMaxNumHeadings);
   }
   for (size_t landmark = 0; landmark < visual_map.landmarks.size(); ++landmark) {
     int64_t before = -1;
     for (const HeadingModel& model : visual_map.landmarks[landmark]) {
       if (model.heading <= before || model.heading >= static_cast<int64_t>(headings.size()))
-        return Invalid("landmark {}: its headings are not ascending below {}", landmark, headings.size());
+        return InvalidVisual("landmark {}: its headings are not ascending below {}", landmark,
+                             headings.size());
       before = model.heading;
       CAIRN_RETURN_IF_ERROR(CheckModel(model, landmark, num_images));
     }

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 // A keypoint at the border may lie a little outside, where an image was made smaller before.
 constexpr float kBorderPx = 1;
 
-bool IsThere(const std::string& path) {
+bool HasPath(const std::string& path) {
   std::error_code error;
   return fs::exists(fs::symlink_status(path, error));
 }
@@ -109,7 +109,7 @@ std::string SessionFeaturesPath(const std::string& root, const std::string& sess
 std::string CaptureFeatures::PathOf(const std::string& session) const {
   const std::string path =
       session.empty() ? root_ + "/" + kFeaturesFile : SessionFeaturesPath(root_, session);
-  return IsThere(path) ? path : "";
+  return HasPath(path) ? path : "";
 }
 
 std::string CaptureFeatures::SessionOf(const std::string& name) const {

@@ -42,7 +42,7 @@ Status ReadCameras(const std::string& path, ColmapModel* model) {
   return reader.Finished() ? Ok() : Status(Truncated(path, bytes.size()));
 }
 
-Status ReadImages(const std::string& path, ColmapModel* model) {
+Status ReadBinaryImages(const std::string& path, ColmapModel* model) {
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   BlobReader reader(bytes);
   const uint64_t num_images = reader.UInt64();
@@ -72,7 +72,7 @@ Status ReadImages(const std::string& path, ColmapModel* model) {
   return reader.Finished() ? Ok() : Status(Truncated(path, bytes.size()));
 }
 
-Status ReadPoints(const std::string& path, ColmapModel* model) {
+Status ReadBinaryPoints(const std::string& path, ColmapModel* model) {
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   BlobReader reader(bytes);
   const uint64_t num_points = reader.UInt64();
@@ -151,10 +151,11 @@ std::string PointsBytes(const ColmapModel& model) {
 Result<ColmapModel> ReadColmapModelBinary(const std::string& folder) {
   ColmapModel model;
   CAIRN_RETURN_IF_ERROR(ReadCameras(folder + "/cameras.bin", &model));
-  CAIRN_RETURN_IF_ERROR(ReadImages(folder + "/images.bin", &model));
+  CAIRN_RETURN_IF_ERROR(ReadBinaryImages(folder + "/images.bin", &model));
   const std::string points_path = folder + "/points3D.bin";
   std::error_code error;
-  if (std::filesystem::exists(points_path, error)) CAIRN_RETURN_IF_ERROR(ReadPoints(points_path, &model));
+  if (std::filesystem::exists(points_path, error))
+    CAIRN_RETURN_IF_ERROR(ReadBinaryPoints(points_path, &model));
   return model;
 }
 

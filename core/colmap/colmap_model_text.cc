@@ -53,7 +53,7 @@ bool ParseKeypoints(std::string_view line, std::vector<ModelKeypoint>* keypoints
   return reader.ok();
 }
 
-Status ReadImages(const std::string& path, ColmapModel* model) {
+Status ReadTextImages(const std::string& path, ColmapModel* model) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   const std::vector<std::string_view> lines = SplitLines(contents);
   for (size_t i = 0; i < lines.size(); ++i) {
@@ -68,7 +68,7 @@ Status ReadImages(const std::string& path, ColmapModel* model) {
   return Ok();
 }
 
-Status ReadPoints(const std::string& path, ColmapModel* model) {
+Status ReadTextPoints(const std::string& path, ColmapModel* model) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   int line_number = 0;
   for (const std::string_view line : SplitLines(contents)) {
@@ -154,10 +154,10 @@ Result<ModelImage> ParseImageLine(std::string_view line) {
 Result<ColmapModel> ReadColmapModelText(const std::string& folder) {
   ColmapModel model;
   CAIRN_ASSIGN_OR_RETURN(model.cameras, ReadCamerasText(folder + "/cameras.txt"));
-  CAIRN_RETURN_IF_ERROR(ReadImages(folder + "/images.txt", &model));
+  CAIRN_RETURN_IF_ERROR(ReadTextImages(folder + "/images.txt", &model));
   const std::string points_path = folder + "/points3D.txt";
   std::error_code error;
-  if (std::filesystem::exists(points_path, error)) CAIRN_RETURN_IF_ERROR(ReadPoints(points_path, &model));
+  if (std::filesystem::exists(points_path, error)) CAIRN_RETURN_IF_ERROR(ReadTextPoints(points_path, &model));
   return model;
 }
 

@@ -113,6 +113,15 @@ std::string DatabasePath(const SQLite::Database& database);
 bool HasTable(SQLite::Database& database, const std::string& table);
 bool HasColumn(SQLite::Database& database, const std::string& table, const std::string& column);
 
+// Binds a vector's elements as a blob, which is not copied: the vector has to outlive the statement's step.
+template <typename T>
+void BindVector(SQLite::Statement& statement, int index, const std::vector<T>& values) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  static const T kNone{};  // a blob of no bytes still needs an address, or it is NULL
+  statement.bindNoCopy(index, values.empty() ? &kNone : values.data(),
+                       static_cast<int>(values.size() * sizeof(T)));
+}
+
 // A blob as a vector of T.  Errors: Corrupt when its length is not a multiple of sizeof(T).  `what` names it.
 template <typename T>
 Result<std::vector<T>> BlobToVector(const SQLite::Column& column, const std::string& what) {

@@ -14,24 +14,25 @@
 namespace cairn {
 namespace {
 
-constexpr int64_t kMaxCoordinate = 2'000'000'000;  // 200 km in units of 0.1 mm
+constexpr int64_t kMaxTenthsOfMm = 2'000'000'000;  // 200 km in units of 0.1 mm
 constexpr int kNumCells = 4, kNumOrientations = 8;
 
 // Sizes by quarters of an octave: 0, or 1 + number of them from 1 um.
-constexpr int kSizeBits = 7;
+constexpr int kLandmarkSizeBits = 7;
 
-constexpr double kSmallestSizeM = 1e-6;
-constexpr double kSizesPerOctave = 4;
+constexpr double kSmallestLandmarkM = 1e-6;
+constexpr double kLandmarkSizesPerOctave = 4;
 
 uint8_t PackSize(double metres) {
   if (!(metres > 0)) return 0;
-  constexpr double kMost = (1 << kSizeBits) - 2;
-  const double size = std::round(kSizesPerOctave * std::log2(metres / kSmallestSizeM));
+  constexpr double kMost = (1 << kLandmarkSizeBits) - 2;
+  const double size = std::round(kLandmarkSizesPerOctave * std::log2(metres / kSmallestLandmarkM));
   return static_cast<uint8_t>(1 + std::clamp(size, 0.0, kMost));
 }
 
 double UnpackSize(uint32_t code) {
-  return code == 0 ? 0 : kSmallestSizeM * std::exp2((static_cast<int>(code) - 1) / kSizesPerOctave);
+  return code == 0 ? 0
+                   : kSmallestLandmarkM * std::exp2((static_cast<int>(code) - 1) / kLandmarkSizesPerOctave);
 }
 
 // A covariance matrix as its Cholesky factor L: the diagonal, which says how exactly a coordinate is known
@@ -98,11 +99,11 @@ int64_t RoundShift(int64_t value, int shift) {
   return shift == 0 ? value : (value + (int64_t{1} << (shift - 1))) >> shift;
 }
 
-// Models of everything that is coded per landmark, for either direction.
-struct Models {
+// LandmarkModels of everything that is coded per landmark, for either direction.
+struct LandmarkModels {
   AdaptiveNumber class_step, num_observations;
-  AdaptiveSymbol<kSizeBits> scale;
-  std::array<AdaptiveSymbol<kSizeBits>, 3> sizes;
+  AdaptiveSymbol<kLandmarkSizeBits> scale;
+  std::array<AdaptiveSymbol<kLandmarkSizeBits>, 3> sizes;
   std::array<AdaptiveNumber, 3> ratios;
   std::array<AdaptiveNumber, 3> offsets;
   std::array<AdaptiveBit, 6> signs;
@@ -147,8 +148,8 @@ int SizeAround(const TransformLevels& levels, int coefficient) {
 
 // False where a level is too large for a descriptor.
 template <typename Coder>
-bool CodeLevels(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, int step, Models* models,
-                TransformLevels* levels) {
+bool CodeLevels(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, int step,
+                LandmarkModels* models, TransformLevels* levels) {
   constexpr int64_t kMaxCoefficient = 4096;  // of a descriptor: below 255 sqrt(128)
   for (const int coefficient : order) {
     int16_t& level = (*levels)[coefficient];
@@ -160,8 +161,8 @@ bool CodeLevels(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, 
     const bool is_negative = coder.Bit(&model[1], level < 0);
     const int64_t given = std::abs(level);
     int64_t size = 1;
-    while (size <= Models::kNumSteps && coder.Bit(&model[1 + size], given > size)) ++size;
-    if (size > Models::kNumSteps)
+    while (size <= LandmarkModels::kNumSteps && coder.Bit(&model[1 + size], given > size)) ++size;
+    if (size > LandmarkModels::kNumSteps)
       size += static_cast<int64_t>(models->large_level.Code(coder, static_cast<uint64_t>(given - size)));
     if (size * step > kMaxCoefficient) return false;
     level = static_cast<int16_t>(is_negative ? -size : size);
@@ -187,7 +188,7 @@ PackedLandmark PackLandmark(const MapLandmark& landmark) {
   const int shift = PositionShift(packed.covariance);
   for (int axis = 0; axis < 3; ++axis)
     packed.position[axis] = std::clamp(RoundShift(EncodeLength(landmark.position[axis]), shift),
-                                       -(kMaxCoordinate >> shift), kMaxCoordinate >> shift);
+                                       -(kMaxTenthsOfMm >> shift), kMaxTenthsOfMm >> shift);
   return packed;
 }
 
@@ -204,7 +205,7 @@ bool UnpackLandmark(const PackedLandmark& packed, MapLandmark* landmark) {
   const int shift = PositionShift(packed.covariance);
   for (int axis = 0; axis < 3; ++axis) {
     const int64_t coordinate = packed.position[axis];
-    if (std::abs(coordinate) > kMaxCoordinate >> shift) return false;
+    if (std::abs(coordinate) > kMaxTenthsOfMm >> shift) return false;
     landmark->position[axis] = DecodeLength(coordinate << shift);
   }
   return true;
@@ -213,7 +214,7 @@ bool UnpackLandmark(const PackedLandmark& packed, MapLandmark* landmark) {
 // Everything of a landmark but its descriptor, given the one before and the middle of all, 0.1 mm.
 template <typename Coder>
 void CodeLandmark(Coder& coder, const std::array<int64_t, 3>& middle, int64_t previous_class_id,
-                  Models* models, PackedLandmark* packed) {
+                  LandmarkModels* models, PackedLandmark* packed) {
   const uint64_t step = models->class_step.Code(coder, ZigZag(packed->class_id - previous_class_id));
   packed->class_id = previous_class_id + UnZigZag(step);
   packed->num_observations = models->num_observations.Code(coder, packed->num_observations);
@@ -235,7 +236,7 @@ void CodeLandmark(Coder& coder, const std::array<int64_t, 3>& middle, int64_t pr
 
 template <typename Coder>
 bool CodeDescriptor(Coder& coder, const std::array<int, kSiftDescriptorDim>& order, const TransformCode& code,
-                    Models* models, uint8_t* descriptor) {
+                    LandmarkModels* models, uint8_t* descriptor) {
   constexpr int kBitsPerValue = 8;
   TransformLevels levels = {};
   bool is_exact = true;
@@ -305,7 +306,7 @@ class LandmarksCoder {
   TransformCode code_;
   Middle middle_;
   int64_t class_id_ = 0;
-  std::unique_ptr<Models> models_ = std::make_unique<Models>();
+  std::unique_ptr<LandmarkModels> models_ = std::make_unique<LandmarkModels>();
   std::array<int, kSiftDescriptorDim> order_ = CoefficientOrder();
 };
 

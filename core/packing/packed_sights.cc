@@ -17,7 +17,7 @@ constexpr std::array<int64_t, 3> kGroupSizes = {4096, 256, 16};
 constexpr int kReferenceBits = 8;
 constexpr int kNone = 0;  // reference 1 is the image before
 
-struct Models {
+struct SightModels {
   // Per size of groups: by how many of the landmarks in it the references see (at most 5), and whether the
   // image sees any of the two groups before.
   std::array<std::array<AdaptiveBit, 6 * 4>, kGroupSizes.size()> groups;
@@ -40,7 +40,7 @@ class SightsCoder {
       : coder_(coder),
         num_landmarks_(num_landmarks),
         max_num_seen_(max_num_seen),
-        models_(std::make_unique<Models>()) {}
+        models_(std::make_unique<SightModels>()) {}
 
   // False where there are more landmarks than an image may have.
   bool Code(std::array<int, 2> references, const SightLists& images, size_t image,
@@ -123,7 +123,7 @@ class SightsCoder {
   Coder& coder_;
   int64_t num_landmarks_;
   size_t max_num_seen_;
-  std::unique_ptr<Models> models_;
+  std::unique_ptr<SightModels> models_;
   std::vector<std::pair<int32_t, int>> times_seen_;
   std::vector<int32_t> seen_;
   const std::vector<int32_t>* given_ = nullptr;

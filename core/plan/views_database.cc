@@ -7,16 +7,10 @@
 namespace cairn {
 namespace {
 
-constexpr int kApplicationId = 0x63727677;
-constexpr int kVersion = 1;
+constexpr int kViewsApplicationId = 0x63727677;
+constexpr int kViewsVersion = 1;
 constexpr size_t kLinksPerRow = 65536;
 constexpr FaceIdx kRegionsPerReport = 4096;
-
-void BindNumbers(SQLite::Statement& statement, int index, const std::vector<int32_t>& values) {
-  static constexpr int32_t kNone = 0;  // a blob of no bytes still needs an address, or it is NULL
-  statement.bindNoCopy(index, values.empty() ? &kNone : values.data(),
-                       static_cast<int>(values.size() * sizeof(int32_t)));
-}
 
 std::vector<int32_t> Flat(const std::vector<GridPoint>& points) {
   std::vector<int32_t> values;
@@ -49,8 +43,8 @@ void WritePlan(SQLite::Database& database, const Views& views) {
   head.bind(8, plan.high.y);
   head.bind(9, views.num_faces());
   const std::vector<int32_t> plan_vertices = Flat(plan.vertices), vertices = Flat(views.vertices);
-  BindNumbers(head, 10, plan_vertices);
-  BindNumbers(head, 11, vertices);
+  BindVector(head, 10, plan_vertices);
+  BindVector(head, 11, vertices);
   head.exec();
 
   std::vector<std::vector<int32_t>> pieces(plan.walls.size());
@@ -63,7 +57,7 @@ void WritePlan(SQLite::Database& database, const Views& views) {
     row.bind(3, plan.walls[i].start.y());
     row.bind(4, plan.walls[i].end.x());
     row.bind(5, plan.walls[i].end.y());
-    BindNumbers(row, 6, pieces[i]);
+    BindVector(row, 6, pieces[i]);
     row.exec();
     row.reset();
   }
@@ -83,7 +77,7 @@ Status WriteRegions(SQLite::Database& database, const Views& views, Progress& pr
         EncodeAscending({views.toggled_labels.begin() + views.toggle_offsets[face],
                          views.toggled_labels.begin() + views.toggle_offsets[face + 1]});
     row.bind(1, face);
-    BindNumbers(row, 2, corners);
+    BindVector(row, 2, corners);
     if (views.parents[face] >= 0) {
       row.bind(3, views.parents[face]);
     } else {
@@ -112,7 +106,7 @@ void WriteLinks(SQLite::Database& database, const Views& views) {
       values.insert(values.end(), {link.a, link.b, link.start, link.end});
     }
     row.bind(1, static_cast<int64_t>(first / kLinksPerRow));
-    BindNumbers(row, 2, values);
+    BindVector(row, 2, values);
     row.exec();
     row.reset();
   }
@@ -206,12 +200,12 @@ Result<Views> ReadViews(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<Views> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
     if (!HasTable(database, "plan") ||
-        database.execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
+        database.execAndGet("PRAGMA application_id").getInt() != kViewsApplicationId) {
       return Corrupt(path, "not a database of view-invariant regions (decompose-views writes them)");
     }
-    if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kVersion) {
+    if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kViewsVersion) {
       return MakeError(ErrorCode::kUnsupported, "{}: views version {}, this program reads {}", path, version,
-                       kVersion);
+                       kViewsVersion);
     }
     Views views;
     int64_t num_regions = 0;

@@ -15,7 +15,7 @@ constexpr double kMetTolerance = 1e-6;
 constexpr int kPatience = 15;
 constexpr int kIterationsPerCover = 100;
 // Bodies of ParallelFor take so many at a time.
-constexpr int64_t kClassesAtOnce = 1024;
+constexpr int64_t kCoveredAtOnce = 1024;
 constexpr int64_t kNodesAtOnce = 64;
 
 template <class Body>
@@ -144,7 +144,7 @@ class Dual {
 
   // The bound that prices prove, and its subgradient.
   double Evaluate(const std::vector<double>& prices, std::vector<double>* gradient) {
-    ForChunks(worth_.size(), kClassesAtOnce, num_threads_, [&](int64_t i) {
+    ForChunks(worth_.size(), kCoveredAtOnce, num_threads_, [&](int64_t i) {
       double worth = 0;
       for (const ExpectedMatch& match : (*problem_.of_class)[i])
         worth += match.probability * prices[match.view];

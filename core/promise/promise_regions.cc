@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kNumNeighbours = 8;
 constexpr int32_t kNoNode = -1;
 // Demands count as met when this little is lacking: probabilities are sums of floats.
-constexpr double kMetTolerance = 1e-6;
+constexpr double kMetRegionTolerance = 1e-6;
 
 // Per node the nearest others, and those whose nearest it is, ascending.
 std::vector<std::vector<int32_t>> Neighbours(const std::vector<PromiseNode>& nodes, double radius,
@@ -182,7 +182,7 @@ class Divider {
   // Gains never grow: an earlier one is a bound.
   std::vector<size_t> ExtraFor(int32_t node) {
     std::vector<size_t> extra;
-    if (!(lacking_[node] > kMetTolerance)) return extra;
+    if (!(lacking_[node] > kMetRegionTolerance)) return extra;
     using Candidate = std::pair<double, size_t>;  // a bound of its gain; class
     const auto worse = [](const Candidate& a, const Candidate& b) {
       return a.first != b.first ? a.first < b.first : a.second > b.second;
@@ -192,7 +192,7 @@ class Divider {
       if (is_in_[i] == 0) heap.emplace_back(GainFor(node, i), i);
     }
     std::make_heap(heap.begin(), heap.end(), worse);
-    while (!heap.empty() && lacking_[node] > kMetTolerance) {
+    while (!heap.empty() && lacking_[node] > kMetRegionTolerance) {
       std::pop_heap(heap.begin(), heap.end(), worse);
       heap.back().first = GainFor(node, heap.back().second);
       if (worse(heap.back(), heap.front())) {

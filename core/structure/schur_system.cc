@@ -13,13 +13,13 @@
 namespace cairn {
 namespace {
 
-constexpr int64_t kPointsAtOnce = 512;  // by one thread
-constexpr size_t kAhead = 3;            // so many slots of a column are on their way from memory
+constexpr int64_t kPointsSummedAtOnce = 512;  // by one thread
+constexpr size_t kAhead = 3;                  // so many slots of a column are on their way from memory
 
 // body(i) for every i below `num_items`, in chunks.
 template <typename Body>
 void ForEach(int64_t num_items, int num_threads, const Body& body) {
-  ParallelForRuns(num_items, kPointsAtOnce, num_threads, [&](int64_t begin, int64_t end) {
+  ParallelForRuns(num_items, kPointsSummedAtOnce, num_threads, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) body(i);
   });
 }

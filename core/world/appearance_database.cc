@@ -8,15 +8,8 @@
 namespace cairn {
 namespace {
 
-constexpr int kApplicationId = 0x63726167;
-constexpr int kVersion = 2;
-
-template <typename T>
-void BindVector(SQLite::Statement& statement, int index, const std::vector<T>& values) {
-  static const T kNone{};  // a blob of no bytes still needs an address, or it is NULL
-  statement.bindNoCopy(index, values.empty() ? &kNone : values.data(),
-                       static_cast<int>(values.size() * sizeof(T)));
-}
+constexpr int kAppearanceApplicationId = 0x63726167;
+constexpr int kAppearanceVersion = 2;
 
 void WriteComponents(SQLite::Database& database, const Appearance& appearance) {
   std::vector<int> num_nodes(appearance.NumComponents(), 0), num_kept(appearance.NumComponents(), 0);
@@ -140,14 +133,15 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
   return Ok();
 }
 
-Result<Appearance> ReadTables(SQLite::Database& database, const std::string& path) {
+Result<Appearance> ReadAppearanceTables(SQLite::Database& database, const std::string& path) {
   if (!HasTable(database, "appearance") ||
-      database.execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
+      database.execAndGet("PRAGMA application_id").getInt() != kAppearanceApplicationId) {
     return MakeError(ErrorCode::kCorrupt, "{}: not an appearance graph (link-appearance writes them)", path);
   }
-  if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kVersion) {
+  if (const int version = database.execAndGet("PRAGMA user_version").getInt();
+      version != kAppearanceVersion) {
     return MakeError(ErrorCode::kUnsupported, "{}: appearance version {}, this program reads {}", path,
-                     version, kVersion);
+                     version, kAppearanceVersion);
   }
   SQLite::Statement header(database,
                            "SELECT num_nodes, num_links, num_components, num_dominators, strong_num_inliers, "
@@ -230,7 +224,7 @@ Status WriteAppearance(const Appearance& appearance, const std::string& path) {
 Result<Appearance> ReadAppearance(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<Appearance> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
-    return ReadTables(database, path);
+    return ReadAppearanceTables(database, path);
   });
 }
 

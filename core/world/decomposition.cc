@@ -7,8 +7,8 @@
 namespace cairn {
 namespace {
 
-constexpr int kApplicationId = 0x63727267;
-constexpr int kVersion = 1;
+constexpr int kRegionsApplicationId = 0x63727267;
+constexpr int kRegionsVersion = 1;
 
 void BindIndices(SQLite::Statement& statement, int index, const std::vector<int32_t>& values) {
   static constexpr int32_t kNone = 0;  // a blob of no bytes still needs an address, or it is NULL
@@ -16,15 +16,15 @@ void BindIndices(SQLite::Statement& statement, int index, const std::vector<int3
                        static_cast<int>(values.size() * sizeof(int32_t)));
 }
 
-Result<Decomposition> ReadTables(SQLite::Database& database, const std::string& path) {
+Result<Decomposition> ReadRegionsTables(SQLite::Database& database, const std::string& path) {
   if (!HasTable(database, "decomposition") ||
-      database.execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
+      database.execAndGet("PRAGMA application_id").getInt() != kRegionsApplicationId) {
     return MakeError(ErrorCode::kCorrupt, "{}: not a database of regions (decompose-regions writes them)",
                      path);
   }
-  if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kVersion) {
+  if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kRegionsVersion) {
     return MakeError(ErrorCode::kUnsupported, "{}: regions version {}, this program reads {}", path, version,
-                     kVersion);
+                     kRegionsVersion);
   }
   Decomposition decomposition;
   SQLite::Statement header(database,
@@ -54,7 +54,7 @@ Result<Decomposition> ReadTables(SQLite::Database& database, const std::string& 
   return decomposition;
 }
 
-void WriteTables(SQLite::Database& database, const Decomposition& decomposition) {
+void WriteRegionsTables(SQLite::Database& database, const Decomposition& decomposition) {
   SQLite::Statement header(database, "INSERT INTO decomposition VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
   header.bind(1, decomposition.algorithm);
   header.bind(2, decomposition.k);
@@ -83,7 +83,7 @@ bool HasJsonSuffix(const std::string& path) {
 Status WriteWithDropped(const Decomposition& decomposition, const std::string& path,
                         const std::vector<DroppedItem>& dropped_items) {
   return WriteDatabase(path, kRegionsSql, [&](SQLite::Database& database) -> Status {
-    WriteTables(database, decomposition);
+    WriteRegionsTables(database, decomposition);
     WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
     return Ok();
   });
@@ -102,7 +102,7 @@ std::string NumRegionsText(size_t num_regions, std::optional<int> lower_bound) {
 Result<Decomposition> ReadDecompositionDatabase(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<Decomposition> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
-    return ReadTables(database, path);
+    return ReadRegionsTables(database, path);
   });
 }
 

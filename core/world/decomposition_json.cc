@@ -11,7 +11,7 @@ namespace cairn {
 namespace {
 
 constexpr char kFormat[] = "cairn-regions";
-constexpr int kVersion = 1;
+constexpr int kRegionsJsonVersion = 1;
 
 // nlohmann::json would truncate 1.5 and 99999999999 to some int.
 int IntegerOf(const nlohmann::json& value) {
@@ -44,9 +44,9 @@ Result<Decomposition> ReadDecompositionJson(const std::string& path) {
     if (const std::string format = member(document, "format").get<std::string>(); format != kFormat) {
       return MakeError(ErrorCode::kCorrupt, "{}: \"format\" is '{}', expected '{}'", path, format, kFormat);
     }
-    if (const int version = IntegerOf(member(document, "version")); version != kVersion) {
+    if (const int version = IntegerOf(member(document, "version")); version != kRegionsJsonVersion) {
       return MakeError(ErrorCode::kUnsupported, "{}: regions version {}, this program reads {}", path,
-                       version, kVersion);
+                       version, kRegionsJsonVersion);
     }
     Decomposition decomposition;
     decomposition.algorithm = member(document, "algorithm").get<std::string>();
@@ -82,8 +82,8 @@ Status WriteDecompositionJson(const Decomposition& decomposition, const std::str
       out,
       "{{\"format\":\"{}\",\"version\":{},\"algorithm\":{},\"k\":{},\"tau\":{},\"rho\":{},\"seed\":{},"
       "\"lower_bound\":{},\"uncovered_limit\":{},\n\"regions\":[",
-      kFormat, kVersion, nlohmann::json(decomposition.algorithm).dump(), decomposition.k, decomposition.tau,
-      decomposition.rho, decomposition.seed,
+      kFormat, kRegionsJsonVersion, nlohmann::json(decomposition.algorithm).dump(), decomposition.k,
+      decomposition.tau, decomposition.rho, decomposition.seed,
       decomposition.lower_bound ? fmt::format("{}", *decomposition.lower_bound) : "null",
       decomposition.uncovered_limit);
   for (size_t i = 0; i < decomposition.regions.size(); ++i) {

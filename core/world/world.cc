@@ -11,8 +11,8 @@
 namespace cairn {
 namespace {
 
-constexpr int kApplicationId = 0x63727764;
-constexpr int kVersion = 1;
+constexpr int kWorldApplicationId = 0x63727764;
+constexpr int kWorldVersion = 1;
 
 Status CheckEdges(const World& world) {
   for (size_t i = 0; i < world.edges.size(); ++i) {
@@ -77,14 +77,14 @@ Status CheckSize(const char* what, size_t size, size_t expected) {
   return MakeError(ErrorCode::kInvalidArgument, "{}: {} entries, expected none or {}", what, size, expected);
 }
 
-Result<World> ReadTables(SQLite::Database& database, const std::string& path) {
+Result<World> ReadWorldTables(SQLite::Database& database, const std::string& path) {
   if (!HasTable(database, "world") ||
-      database.execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
+      database.execAndGet("PRAGMA application_id").getInt() != kWorldApplicationId) {
     return MakeError(ErrorCode::kCorrupt, "{}: not a world database (filter-visibility writes them)", path);
   }
-  if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kVersion) {
+  if (const int version = database.execAndGet("PRAGMA user_version").getInt(); version != kWorldVersion) {
     return MakeError(ErrorCode::kUnsupported, "{}: world version {}, this program reads {}", path, version,
-                     kVersion);
+                     kWorldVersion);
   }
   World world;
   SQLite::Statement header(
@@ -139,14 +139,7 @@ Result<World> ReadTables(SQLite::Database& database, const std::string& path) {
   return world;
 }
 
-template <typename T>
-void BindVector(SQLite::Statement& statement, int index, const std::vector<T>& values) {
-  static const T kNone{};  // a blob of no bytes still needs an address, or it is NULL
-  statement.bindNoCopy(index, values.empty() ? &kNone : values.data(),
-                       static_cast<int>(values.size() * sizeof(T)));
-}
-
-void WriteTables(SQLite::Database& database, const World& world) {
+void WriteWorldTables(SQLite::Database& database, const World& world) {
   SQLite::Statement header(database, "INSERT INTO world VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   header.bind(1, world.num_stations());
   header.bind(2, static_cast<int64_t>(world.edges.size()));
@@ -221,7 +214,7 @@ Status CheckWorld(const World& world) {
 Result<World> ReadWorldDatabase(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<World> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
-    return ReadTables(database, path);
+    return ReadWorldTables(database, path);
   });
 }
 
@@ -229,7 +222,7 @@ Status WriteWorldDatabase(const World& world, const std::string& path,
                           const std::vector<DroppedItem>& dropped_items) {
   CAIRN_RETURN_IF_ERROR(CheckWorld(world));
   return WriteDatabase(path, kWorldSql, [&](SQLite::Database& database) -> Status {
-    WriteTables(database, world);
+    WriteWorldTables(database, world);
     WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
     return Ok();
   });

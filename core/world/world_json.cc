@@ -15,7 +15,7 @@ namespace cairn {
 namespace {
 
 constexpr char kFormat[] = "cairn-world";
-constexpr int kVersion = 1;
+constexpr int kWorldJsonVersion = 1;
 
 // Receives the parser's events.  Depth 1 is the document's object; a member is a number, a string, an array
 // of numbers, or an array of arrays of numbers.  Unknown members are skipped.
@@ -214,9 +214,9 @@ Status CheckDocument(const WorldHandler& handler) {
   if (handler.format != kFormat) {
     return MakeError(ErrorCode::kCorrupt, "\"format\" is '{}', expected '{}'", handler.format, kFormat);
   }
-  if (handler.version != kVersion) {
+  if (handler.version != kWorldJsonVersion) {
     return MakeError(ErrorCode::kUnsupported, "world version {:g}, this program reads {}", handler.version,
-                     kVersion);
+                     kWorldJsonVersion);
   }
   for (const auto& [has, name] :
        {std::pair(handler.has_poses, "poses"), std::pair(handler.has_edges, "edges"),
@@ -258,7 +258,7 @@ Status WriteWorldJson(const World& world, const std::string& path) {
     }
     text.push_back(']');
   };
-  fmt::format_to(out, "{{\"format\":\"{}\",\"version\":{}", kFormat, kVersion);
+  fmt::format_to(out, "{{\"format\":\"{}\",\"version\":{}", kFormat, kWorldJsonVersion);
   list("poses", world.positions.size(),
        [&](size_t i) { fmt::format_to(out, "[{},{}]", world.positions[i].x(), world.positions[i].y()); });
   list("edges", world.edges.size(),

@@ -15,7 +15,7 @@ namespace {
 using testing::DoubleNear;
 using testing::ElementsAre;
 
-DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
+DescriptorMatrix RandomQuery(int count, uint64_t seed) {
   Random random(seed);
   DescriptorMatrix descriptors(count, kSiftDescriptorDim);
   for (Eigen::Index i = 0; i < descriptors.size(); ++i)
@@ -26,14 +26,14 @@ DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
 Vocabulary RandomVocabulary(int num_images) {
   std::vector<ImageDescriptors> images;
   for (int i = 0; i < num_images; ++i)
-    images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(40 + i, 7 + i)});
+    images.push_back({static_cast<ImageId>(i + 1), RandomQuery(40 + i, 7 + i)});
   NoProgress progress;
   return *BuildVocabulary(images, {}, {}, 0, 1, progress);
 }
 
 TEST(DocumentScores, AreThoseOfTheQuery) {
   const Vocabulary vocabulary = RandomVocabulary(12);
-  const DescriptorMatrix query = RandomDescriptors(60, 99);
+  const DescriptorMatrix query = RandomQuery(60, 99);
   const std::vector<double> scores = ScoreDocuments(vocabulary, CountWords(vocabulary, query));
   std::vector<double> expected(scores.size(), 0.0);
   for (const ScoredDocument& scored : QueryVocabulary(vocabulary, query, 1000))
@@ -45,7 +45,7 @@ TEST(DocumentScores, ADocumentIsItsOwnBestMatch) {
   const Vocabulary vocabulary = RandomVocabulary(12);
   const std::vector<BagOfWords> bags = DocumentWords(vocabulary);
   for (size_t i = 0; i < bags.size(); ++i) {
-    EXPECT_EQ(bags[i], CountWords(vocabulary, RandomDescriptors(40 + static_cast<int>(i), 7 + i)));
+    EXPECT_EQ(bags[i], CountWords(vocabulary, RandomQuery(40 + static_cast<int>(i), 7 + i)));
     const std::vector<double> scores = ScoreDocuments(vocabulary, bags[i]);
     EXPECT_NEAR(scores[i], 1, 1e-6);
     EXPECT_LE(*std::max_element(scores.begin(), scores.end()), 1);
@@ -56,7 +56,7 @@ TEST(DocumentScores, NothingSharedScoresNothing) {
   const Vocabulary vocabulary = RandomVocabulary(3);
   EXPECT_THAT(ScoreDocuments(vocabulary, {}), ElementsAre(0, 0, 0));
   EXPECT_TRUE(CountWords(vocabulary, DescriptorMatrix(0, kSiftDescriptorDim)).empty());
-  EXPECT_TRUE(CountWords(Vocabulary(), RandomDescriptors(5, 1)).empty());
+  EXPECT_TRUE(CountWords(Vocabulary(), RandomQuery(5, 1)).empty());
 }
 
 TEST(ProbabilitiesOfScores, AUniquePlaceGivesAPeakAndTwinsGiveTwo) {

@@ -24,7 +24,7 @@ MapRows FourStations() {
   return rows;
 }
 
-Pose At(double x, double heading_deg = 0) { return PoseAt({x, 0, 1.2}, heading_deg); }
+Pose StandingAt(double x, double heading_deg = 0) { return PoseAt({x, 0, 1.2}, heading_deg); }
 
 std::optional<StationIdx> Station(const MapRows& rows, const Pose& pose) {
   return StationOf(pose, StationSpacingM(rows.stations), rows, {});
@@ -43,10 +43,10 @@ HeldOutResult Outcome(std::optional<double> error_m) {
 TEST(RegionFigures, ImageStandsAtTheNearestStationUnlessItIsTooFar) {
   const MapRows rows = FourStations();
   EXPECT_EQ(StationSpacingM(rows.stations), 1);
-  EXPECT_EQ(Station(rows, At(1.4)), 1);
-  EXPECT_EQ(Station(rows, At(1.5)), 1);  // as near to 2: the first
-  EXPECT_EQ(Station(rows, At(4.5)), 3);
-  EXPECT_EQ(Station(rows, At(4.51)), std::nullopt);
+  EXPECT_EQ(Station(rows, StandingAt(1.4)), 1);
+  EXPECT_EQ(Station(rows, StandingAt(1.5)), 1);  // as near to 2: the first
+  EXPECT_EQ(Station(rows, StandingAt(4.5)), 3);
+  EXPECT_EQ(Station(rows, StandingAt(4.51)), std::nullopt);
 }
 
 TEST(RegionFigures, SpacingIsTheMedianDistanceToTheNextOtherPlace) {
@@ -78,18 +78,18 @@ TEST(RegionFigures, StationOfAnotherHeadingIsPassedOver) {
   rows.stations = {{.position = {0, 0}, .heading_deg = 0},
                    {.position = {0, 0}, .heading_deg = 90},
                    {.position = {1, 0}, .heading_deg = 270}};
-  EXPECT_EQ(Station(rows, At(0, 40)), 0);
-  EXPECT_EQ(Station(rows, At(0, 50)), 1);
-  EXPECT_EQ(Station(rows, At(0, 350)), 0);
-  EXPECT_EQ(Station(rows, At(0, 280)), 2);
-  EXPECT_EQ(Station(rows, At(0, 180)), std::nullopt);
+  EXPECT_EQ(Station(rows, StandingAt(0, 40)), 0);
+  EXPECT_EQ(Station(rows, StandingAt(0, 50)), 1);
+  EXPECT_EQ(Station(rows, StandingAt(0, 350)), 0);
+  EXPECT_EQ(Station(rows, StandingAt(0, 280)), 2);
+  EXPECT_EQ(Station(rows, StandingAt(0, 180)), std::nullopt);
 }
 
 TEST(RegionFigures, StatedPosesAreTakenIntoTheMapsFrame) {
   // The map's cameras stand a metre to the right of where the survey says (x right, y down, z forward).
   MapRows rows = FourStations();
   rows.camera_from_given.translation = {-1, 0, 0};
-  EXPECT_EQ(Station(rows, At(1, 90)), 2);
+  EXPECT_EQ(Station(rows, StandingAt(1, 90)), 2);
 }
 
 TEST(RegionFigures, ImageCountsInEveryRegionOfItsStationOrOutside) {
@@ -97,7 +97,7 @@ TEST(RegionFigures, ImageCountsInEveryRegionOfItsStationOrOutside) {
   std::vector<HeldOutResult> results;
   const auto add = [&](double x, std::optional<double> error_m) {
     results.push_back(Outcome(error_m));
-    results.back().true_cam_from_world = At(x);
+    results.back().true_cam_from_world = StandingAt(x);
   };
   add(0, 0.01);
   add(0.1, 0.04);

@@ -5,8 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "core/base/random.h"
 #include "core/world/world.h"
+#include "stages/decompose_regions/decompose_regions.h"
 
 namespace cairn::decompose_regions {
 
@@ -61,6 +64,14 @@ inline World RandomWorld(int width, int height, int num_features, bool scattered
     }
   }
   return AsciiWorld(stations, features);
+}
+
+// The decomposition of a world that has one.
+inline Decomposition Decompose(const World& world, const DecomposeRegionsOptions& options,
+                               uint64_t seed = 0) {
+  const Result<Decomposition> result = DecomposeRegions(world, options, seed);
+  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
+  return result.ok() ? *result : Decomposition();
 }
 
 }  // namespace cairn::decompose_regions

@@ -23,12 +23,6 @@ const char* const kAlgorithms[] = {"a1", "a2", "a3", "b1", "b2", "c", "best"};
 // feature 3                       . . # # # # #
 World RowWorld() { return AsciiWorld({"ooooooo"}, {{"####..."}, {"#####.."}, {"...####"}, {"..#####"}}); }
 
-Decomposition Decompose(const World& world, const DecomposeRegionsOptions& options, uint64_t seed = 0) {
-  const Result<Decomposition> result = DecomposeRegions(world, options, seed);
-  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
-  return result.ok() ? *result : Decomposition();
-}
-
 TEST(DecomposeRegions, RowOfStationsNeedsTwoRegions) {
   for (const char* algorithm : {"b1", "b2"}) {
     const Decomposition d = Decompose(RowWorld(), {.algorithm = algorithm, .k = 2, .tau = 0, .rho = 0});

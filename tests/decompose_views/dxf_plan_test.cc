@@ -42,7 +42,7 @@ InputPlan Read(const std::string& text, const ReadPlanOptions& options = {.units
   return plan.ok() ? *plan : InputPlan{};
 }
 
-Error ErrorOf(const std::string& text, const ReadPlanOptions& options = {}) {
+Error ErrorOfDrawing(const std::string& text, const ReadPlanOptions& options = {}) {
   const auto plan = ParsePlan(text, "plan.dxf", options);
   EXPECT_FALSE(plan.ok());
   if (plan.ok()) return {};
@@ -168,7 +168,7 @@ TEST(DxfPlan, LayersAreChosenByName) {
   EXPECT_EQ(count("A-WALL"), 2u);  // with the block's line of layer 0
   EXPECT_EQ(count("a-wall*"), 3u);
   EXPECT_EQ(count("A-WALL, furniture"), 3u);
-  const Error none = ErrorOf(text, {.units = "m", .layers = "WALLS"});
+  const Error none = ErrorOfDrawing(text, {.units = "m", .layers = "WALLS"});
   EXPECT_EQ(none.code, ErrorCode::kNoData);
   EXPECT_THAT(none.message, HasSubstr("A-WALL 2, A-WALL-FULL 1, Furniture 1"));
   EXPECT_THAT(Read(text).notes,
@@ -195,7 +195,7 @@ TEST(DxfPlan, WhatIsNotInModelSpaceOrNotReadIsLeftOutAndSaid) {
   EXPECT_THAT(Texts(plan), ElementsAre("0,0,1,0"));
   EXPECT_THAT(plan.notes, testing::Contains(
                               HasSubstr("1 CIRCLE that lies aslant, 1 POLYLINE of faces, 1 SPLINE, 2 TEXT")));
-  EXPECT_EQ(ErrorOf(Drawing(" 0 TEXT 8 A 1 hello")).code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOfDrawing(Drawing(" 0 TEXT 8 A 1 hello")).code, ErrorCode::kNoData);
 }
 
 TEST(DxfPlan, ItsUnitIsThatOfTheFile) {
@@ -211,14 +211,14 @@ TEST(DxfPlan, ItsUnitIsThatOfTheFile) {
   EXPECT_DOUBLE_EQ(length("9 $INSUNITS 70 0", 5), 5);
   EXPECT_DOUBLE_EQ(length("", 5), 5);
   // Not stated, and a building in metres cannot be so large.
-  const Error large = ErrorOf(Drawing(Line(0, 0, 5000, 0) + Line(0, 0, 0, 4000)));
+  const Error large = ErrorOfDrawing(Drawing(Line(0, 0, 5000, 0) + Line(0, 0, 0, 4000)));
   EXPECT_EQ(large.code, ErrorCode::kUnsupported);
   EXPECT_THAT(large.message, HasSubstr("mm: 5 m x 4 m"));
   // It is said to be in millimetres, and is in metres.
-  const Error small = ErrorOf(Drawing(Line(0, 0, 50, 0) + Line(0, 0, 0, 4), "", "9 $INSUNITS 70 4"));
+  const Error small = ErrorOfDrawing(Drawing(Line(0, 0, 50, 0) + Line(0, 0, 0, 4), "", "9 $INSUNITS 70 4"));
   EXPECT_THAT(small.message, HasSubstr("$INSUNITS = 4"));
   EXPECT_THAT(small.message, HasSubstr("m: 50 m x 4 m"));
-  const Error miles = ErrorOf(Drawing(Line(0, 0, 5, 0), "", "9 $INSUNITS 70 3"));
+  const Error miles = ErrorOfDrawing(Drawing(Line(0, 0, 5, 0), "", "9 $INSUNITS 70 3"));
   EXPECT_EQ(miles.code, ErrorCode::kUnsupported);
   EXPECT_THAT(miles.message, HasSubstr("$INSUNITS is 3"));
 }
@@ -226,7 +226,7 @@ TEST(DxfPlan, ItsUnitIsThatOfTheFile) {
 TEST(DxfPlan, BadFilesAreRefusedWithTheLine) {
   const std::string line = Line(0, 0, 1, 0);
   const auto message = [](const std::string& entities, const std::string& blocks = "") {
-    const Error error = ErrorOf(Drawing(entities, blocks));
+    const Error error = ErrorOfDrawing(Drawing(entities, blocks));
     EXPECT_EQ(error.code, ErrorCode::kCorrupt) << entities;
     EXPECT_THAT(error.message, HasSubstr("line ")) << entities;
     return error.message;
@@ -248,7 +248,7 @@ TEST(DxfPlan, BadFilesAreRefusedWithTheLine) {
   // Cut anywhere, it is noticed.
   const std::string whole = Drawing(line + line, kArm);
   for (size_t size = 20; size + 2 < whole.size(); size += 7)
-    EXPECT_THAT(ErrorOf(whole.substr(0, size), {.units = "m"}).message, HasSubstr("line ")) << size;
+    EXPECT_THAT(ErrorOfDrawing(whole.substr(0, size), {.units = "m"}).message, HasSubstr("line ")) << size;
 }
 
 TEST(DxfPlan, BlocksThatMultiplyAreRefusedSoon) {
@@ -263,30 +263,32 @@ TEST(DxfPlan, BlocksThatMultiplyAreRefusedSoon) {
                     i - 1, i - 1);
     before = fmt::format("B{}", i);
   }
-  const Error walls = ErrorOf(Drawing(" 0 INSERT 8 A 2 B30 10 0 20 0", blocks));
+  const Error walls = ErrorOfDrawing(Drawing(" 0 INSERT 8 A 2 B30 10 0 20 0", blocks));
   EXPECT_EQ(walls.code, ErrorCode::kUnsupported);
   EXPECT_THAT(walls.message, HasSubstr("more than 200000 walls"));
-  const Error entities = ErrorOf(Drawing(" 0 INSERT 8 A 2 E30 10 0 20 0", empty));
+  const Error entities = ErrorOfDrawing(Drawing(" 0 INSERT 8 A 2 E30 10 0 20 0", empty));
   EXPECT_EQ(entities.code, ErrorCode::kUnsupported);
   EXPECT_THAT(entities.message, HasSubstr("more than 2000000 entities"));
-  EXPECT_EQ(ErrorOf(Drawing(" 0 INSERT 8 A 2 E0 10 0 20 0 70 2000000000 71 2000000000", empty)).code,
+  EXPECT_EQ(ErrorOfDrawing(Drawing(" 0 INSERT 8 A 2 E0 10 0 20 0 70 2000000000 71 2000000000", empty)).code,
             ErrorCode::kUnsupported);
   EXPECT_EQ(
-      ErrorOf(Drawing(" 0 CIRCLE 8 A 10 0 20 0 40 1e8"), {.units = "m", .curve_tolerance_m = 1e-4}).code,
+      ErrorOfDrawing(Drawing(" 0 CIRCLE 8 A 10 0 20 0 40 1e8"), {.units = "m", .curve_tolerance_m = 1e-4})
+          .code,
       ErrorCode::kUnsupported);
   std::string deep = kArm;
   for (int i = 1; i <= 40; ++i)
     deep += fmt::format(" 0 BLOCK 2 D{} 10 0 20 0 0 INSERT 2 {} 10 0 20 0 0 ENDBLK", i,
                         i == 1 ? std::string("ARM") : fmt::format("D{}", i - 1));
-  EXPECT_THAT(ErrorOf(Drawing(" 0 INSERT 8 A 2 D40 10 0 20 0", deep)).message,
+  EXPECT_THAT(ErrorOfDrawing(Drawing(" 0 INSERT 8 A 2 D40 10 0 20 0", deep)).message,
               HasSubstr("more than 32 deep"));
 }
 
 TEST(DxfPlan, OtherKindsOfDrawingAreNamed) {
-  EXPECT_THAT(ErrorOf(std::string("AutoCAD Binary DXF\r\n\x1a\0", 22)).message, HasSubstr("binary DXF"));
-  EXPECT_THAT(ErrorOf(std::string("AC1032\0\0", 8)).message, HasSubstr("DWG"));
-  EXPECT_THAT(ErrorOf("%PDF-1.7\n").message, HasSubstr("PDF"));
-  EXPECT_THAT(ErrorOf("ISO-10303-21;\n").message, HasSubstr("IFC"));
+  EXPECT_THAT(ErrorOfDrawing(std::string("AutoCAD Binary DXF\r\n\x1a\0", 22)).message,
+              HasSubstr("binary DXF"));
+  EXPECT_THAT(ErrorOfDrawing(std::string("AC1032\0\0", 8)).message, HasSubstr("DWG"));
+  EXPECT_THAT(ErrorOfDrawing("%PDF-1.7\n").message, HasSubstr("PDF"));
+  EXPECT_THAT(ErrorOfDrawing("ISO-10303-21;\n").message, HasSubstr("IFC"));
 }
 
 }  // namespace

@@ -37,4 +37,11 @@ inline std::string PolygonText(const std::vector<Corners>& rings) {
   return text + "]}";
 }
 
+// Rounding far below a hair's breadth of tests/runtime/paths/plan_oracle.h.
+inline DecomposeViewsOptions FineGrid() {
+  DecomposeViewsOptions options;
+  options.clean.grid_m = 1e-6;
+  return options;
+}
+
 }  // namespace cairn::decompose_views

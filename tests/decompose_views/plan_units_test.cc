@@ -29,7 +29,7 @@ std::string Rooms(int num, double factor = 1) {
   return text;
 }
 
-Error ErrorOf(const std::string& text, const ReadPlanOptions& options = {}) {
+Error ErrorOfPlan(const std::string& text, const ReadPlanOptions& options = {}) {
   const auto plan = ParsePlan(text, "plan", options);
   EXPECT_FALSE(plan.ok());
   return plan.ok() ? Error{} : plan.error();
@@ -44,7 +44,7 @@ TEST(PlanUnits, OtherUnitsThanMetresAreRefusedByTheirSize) {
     const char* unit;
   } cases[] = {{1000, "mm"}, {100, "cm"}, {1 / 0.0254, "in"}};
   for (const auto& [factor, unit] : cases) {
-    const Error error = ErrorOf(Rooms(4, factor));
+    const Error error = ErrorOfPlan(Rooms(4, factor));
     EXPECT_EQ(error.code, ErrorCode::kUnsupported);
     EXPECT_THAT(error.message, HasSubstr("no building has this size"));
     // What is advised gives the plan.
@@ -53,15 +53,15 @@ TEST(PlanUnits, OtherUnitsThanMetresAreRefusedByTheirSize) {
     EXPECT_NEAR(plan->segments.back().start.x(), 20, 1e-9);
   }
   EXPECT_THAT(
-      ErrorOf(Rooms(4, 1000)).message,
+      ErrorOfPlan(Rooms(4, 1000)).message,
       HasSubstr(
           "in m (the file does not say in which unit) it has 20000 m x 4000 m, walls of 4000 m (median); "
           "say its unit by units (--units), cm: 200 m x 40 m, walls of 40 m (median); mm: 20 m x 4 m, "
           "walls of 4 m (median); if it is right so, give units = \"m\" (--units m)"));
   // A hall that is so large is taken on request.
   EXPECT_TRUE(ParsePlan(Rooms(4, 1000), "plan", {.units = "m"}).ok());
-  EXPECT_THAT(ErrorOf(Rooms(4), {.units = "mm"}).message, HasSubstr("units"));
-  EXPECT_THAT(ErrorOf(Rooms(4), {.units = "miles"}).message, HasSubstr("units"));
+  EXPECT_THAT(ErrorOfPlan(Rooms(4), {.units = "mm"}).message, HasSubstr("units"));
+  EXPECT_THAT(ErrorOfPlan(Rooms(4), {.units = "miles"}).message, HasSubstr("units"));
 }
 
 TEST(PlanUnits, DegreesAreRecognised) {
@@ -69,7 +69,7 @@ TEST(PlanUnits, DegreesAreRecognised) {
   std::string text =
       "{\"type\": \"LineString\", \"coordinates\": [[18.07,59.33],[18.0704,59.33],[18.0704,59.33004],"
       "[18.07,59.33004]]";
-  const Error error = ErrorOf(text + "}");
+  const Error error = ErrorOfPlan(text + "}");
   EXPECT_EQ(error.code, ErrorCode::kUnsupported);
   EXPECT_THAT(error.message, HasSubstr("degrees"));
   EXPECT_THAT(error.message, HasSubstr("22.7 m x 4.45 m near (18.07020, 59.33002)"));
@@ -82,12 +82,12 @@ TEST(PlanUnits, DegreesAreRecognised) {
            "\"coordinates\": "
            "[[0,0],[5,0],[5,4]]}}]}";
   };
-  EXPECT_THAT(ErrorOf(with_crs("urn:ogc:def:crs:OGC:1.3:CRS84")).message, HasSubstr("CRS84"));
-  EXPECT_THAT(ErrorOf(with_crs("EPSG:4326")).message, HasSubstr("EPSG:4326"));
+  EXPECT_THAT(ErrorOfPlan(with_crs("urn:ogc:def:crs:OGC:1.3:CRS84")).message, HasSubstr("CRS84"));
+  EXPECT_THAT(ErrorOfPlan(with_crs("EPSG:4326")).message, HasSubstr("EPSG:4326"));
   EXPECT_TRUE(ParsePlan(with_crs("urn:ogc:def:crs:EPSG::25832"), "plan").ok());
   EXPECT_TRUE(ParsePlan(with_crs("EPSG:4326"), "plan", {.units = "m"}).ok());
   // Lines, south and west.
-  EXPECT_THAT(ErrorOf("-70.64,-33.45,-70.6399,-33.45\n-70.6399,-33.45,-70.6399,-33.4501\n").message,
+  EXPECT_THAT(ErrorOfPlan("-70.64,-33.45,-70.6399,-33.45\n-70.6399,-33.45,-70.6399,-33.4501\n").message,
               HasSubstr("EPSG:32719"));
 }
 

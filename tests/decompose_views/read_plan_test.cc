@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-Error ErrorOf(const std::string& text) {
+Error ErrorOfText(const std::string& text) {
   const auto input = ParsePlan(text, "plan");
   EXPECT_FALSE(input.ok());
   return input.ok() ? Error{} : input.error();
@@ -26,27 +26,28 @@ TEST(ReadPlan, ReadsSegmentsWithBlanksAndComments) {
 
 TEST(ReadPlan, NamesTheLineThatIsNoSegment) {
   for (const char* line : {"1,2,3", "1,2,3,x", "1,2,3,nan", "1,2,3,inf", "1,2,3,4,5", "1 2 3 4"}) {
-    const Error error = ErrorOf(std::string("0,0,1,1\n") + line);
+    const Error error = ErrorOfText(std::string("0,0,1,1\n") + line);
     EXPECT_EQ(error.code, ErrorCode::kCorrupt);
     EXPECT_THAT(error.message, HasSubstr("plan: line 2: "));
   }
 }
 
 TEST(ReadPlan, QuotesNoBytesThatAreNoText) {
-  EXPECT_THAT(ErrorOf("\x01\xff\x1b[2J").message, HasSubstr("line 1: \"\\x01\\xff\\x1b[2J\""));
+  EXPECT_THAT(ErrorOfText("\x01\xff\x1b[2J").message, HasSubstr("line 1: \"\\x01\\xff\\x1b[2J\""));
 }
 
 TEST(ReadPlan, SaysWhereJsonGoesWrong) {
-  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", ").message, HasSubstr("after 20 bytes"));
-  EXPECT_THAT(ErrorOf("{\"type\": Polygon}").message, HasSubstr("byte 10 of 17"));
-  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1e400,0],[0,1],[0,0]]]}").message,
-              HasSubstr("too large"));
+  EXPECT_THAT(ErrorOfText("{\"type\": \"Polygon\", ").message, HasSubstr("after 20 bytes"));
+  EXPECT_THAT(ErrorOfText("{\"type\": Polygon}").message, HasSubstr("byte 10 of 17"));
+  EXPECT_THAT(
+      ErrorOfText("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1e400,0],[0,1],[0,0]]]}").message,
+      HasSubstr("too large"));
 }
 
 TEST(ReadPlan, AFileWithoutWallsIsNoPlan) {
-  EXPECT_EQ(ErrorOf("").code, ErrorCode::kNoData);
-  EXPECT_EQ(ErrorOf("# nothing\n").code, ErrorCode::kNoData);
-  EXPECT_EQ(ErrorOf("{\"type\": \"FeatureCollection\", \"features\": []}").code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOfText("").code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOfText("# nothing\n").code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOfText("{\"type\": \"FeatureCollection\", \"features\": []}").code, ErrorCode::kNoData);
 }
 
 TEST(ReadPlan, TurnsRingsSoThatTheInteriorIsToTheirLeft) {
@@ -110,11 +111,11 @@ TEST(ReadPlan, LinesOfGeoJsonAreWalls) {
       "plan");
   ASSERT_TRUE(free_space.ok());
   EXPECT_TRUE(free_space->closed());
-  EXPECT_THAT(ErrorOf("{\"type\": \"LineString\", \"coordinates\": [[0,0]]}").message,
+  EXPECT_THAT(ErrorOfText("{\"type\": \"LineString\", \"coordinates\": [[0,0]]}").message,
               HasSubstr("line 1 has 1 points"));
-  EXPECT_THAT(ErrorOf("{\"type\": \"LineString\", \"coordinates\": [[0,0],[1]]}").message,
+  EXPECT_THAT(ErrorOfText("{\"type\": \"LineString\", \"coordinates\": [[0,0],[1]]}").message,
               HasSubstr("line 1: point 2"));
-  EXPECT_EQ(ErrorOf("{\"type\": \"MultiLineString\", \"coordinates\": 1}").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOfText("{\"type\": \"MultiLineString\", \"coordinates\": 1}").code, ErrorCode::kCorrupt);
 }
 
 TEST(ReadPlan, LayersAreForDrawings) {
@@ -123,18 +124,18 @@ TEST(ReadPlan, LayersAreForDrawings) {
 }
 
 TEST(ReadPlan, RefusesWhatIsNoPolygon) {
-  EXPECT_EQ(ErrorOf("{\"type\": \"Point\", \"coordinates\": [0, 0]}").code, ErrorCode::kUnsupported);
-  EXPECT_EQ(ErrorOf("{ not json").code, ErrorCode::kCorrupt);
-  EXPECT_EQ(ErrorOf("{}").code, ErrorCode::kUnsupported);
-  EXPECT_EQ(ErrorOf("{\"type\": \"Polygon\"}").code, ErrorCode::kCorrupt);
-  EXPECT_EQ(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1],[1,1],[0,0]]]}").code,
+  EXPECT_EQ(ErrorOfText("{\"type\": \"Point\", \"coordinates\": [0, 0]}").code, ErrorCode::kUnsupported);
+  EXPECT_EQ(ErrorOfText("{ not json").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOfText("{}").code, ErrorCode::kUnsupported);
+  EXPECT_EQ(ErrorOfText("{\"type\": \"Polygon\"}").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOfText("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1],[1,1],[0,0]]]}").code,
             ErrorCode::kCorrupt);
-  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}").message,
+  EXPECT_THAT(ErrorOfText("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}").message,
               HasSubstr("ring 1 is open"));
   std::string nested = "{\"type\": \"Polygon\", \"coordinates\": []}";
   for (int i = 0; i < 1000; ++i)
     nested = "{\"type\": \"GeometryCollection\", \"geometries\": [" + nested + "]}";
-  EXPECT_EQ(ErrorOf(nested).code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOfText(nested).code, ErrorCode::kCorrupt);
 }
 
 }  // namespace

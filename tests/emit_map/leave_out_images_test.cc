@@ -90,13 +90,6 @@ TEST(PartsOf, NeighboursOfAKeptPlaceWithoutImagesAreKept) {
   EXPECT_FALSE(parts.appearance.has_value());
 }
 
-// Cameras in a row that look at a wall `depth` away: what is within a tenth of that is one view.
-Classes Row(int num_images, double spacing, double depth) {
-  Classes classes = WallSurvey(num_images, spacing);
-  AddClass({0, 0, depth}, {1}, 3, &classes);
-  return classes;
-}
-
 TEST(ChooseLeftOut, ImagesOfTheTriedOnesViewGoWithThem) {
   const auto rounds = ChooseLeftOut(Row(100, 0.1, 2.5), 5);  // a view: 0.25 m, two images either side
   ASSERT_TRUE(rounds.ok());

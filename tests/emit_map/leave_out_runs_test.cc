@@ -13,13 +13,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Cameras in a row that look at a wall `depth` away: what is within a tenth of that is one view.
-Classes Row(int num_images, double spacing, double depth) {
-  Classes classes = WallSurvey(num_images, spacing);
-  AddClass({0, 0, depth}, {1}, 3, &classes);
-  return classes;
-}
-
 int NumTried(const LeftOutRuns& runs) {
   size_t num = 0;
   for (const LeftOutImages& round : runs.rounds) num += round.tried.size();

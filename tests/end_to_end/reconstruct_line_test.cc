@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 // A stretch of the drive in which neighbours match.
-constexpr int kFirstImage = 12, kNumImages = 12;
+constexpr int kFirstImage = 12, kNumLineImages = 12;
 
 // A rendered drive whose poses are hidden: a flat folder of images, and where four of the cameras stood.
 class ReconstructLine : public testing::Test {
@@ -41,13 +41,13 @@ num_queries = 0
     fs::create_directories(Path("flat"));
     std::vector<Reject> rejects;
     std::vector<CaptureImage> images = *ReadImagesText(Path("posed/images.txt"), &rejects);
-    images = {images.begin() + kFirstImage, images.begin() + kFirstImage + kNumImages};
+    images = {images.begin() + kFirstImage, images.begin() + kFirstImage + kNumLineImages};
     for (const CaptureImage& image : images) {
       fs::copy_file(Path("posed/images/" + image.name), Path("flat/" + image.name));
       truth_[image.name] = *image.cam_from_world;
     }
     std::ofstream control_points(Path("control_points.txt"));
-    for (int i = 0; i < kNumImages; i += 3) {
+    for (int i = 0; i < kNumLineImages; i += 3) {
       const Eigen::Vector3d centre = images[i].cam_from_world->Center();
       control_points << fmt::format("{} {} {} {}\n", images[i].name, centre.x(), centre.y(), centre.z());
     }
@@ -86,7 +86,7 @@ TEST_F(ReconstructLine, ImagesWithoutPosesBecomeAMapInTheFrameOfTheControlPoints
   ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
   const auto poses = ReadCapture(Path("flat.build/poses"));
   ASSERT_TRUE(poses.ok()) << poses.error().message;
-  EXPECT_GE(poses->images.size() + poses->queries.size(), 0.8 * kNumImages);
+  EXPECT_GE(poses->images.size() + poses->queries.size(), 0.8 * kNumLineImages);
   for (const auto* list : {&poses->images, &poses->queries}) {
     for (const CaptureImage& image : *list) {
       EXPECT_LT(CenterErrorM(*image.cam_from_world, truth_.at(image.name)), 0.1) << image.name;
@@ -121,8 +121,8 @@ TEST_F(ReconstructLine, EndsWithAVerdictInWordsAndAsAPicture) {
   const auto json = nlohmann::json::parse(ReadFile(Path("flat.build/poses/reconstruction.json")).value());
   const auto verdict = json["verdict"];
   EXPECT_EQ(verdict["is_metric"], true);
-  EXPECT_EQ(verdict["num_images"], kNumImages);
-  EXPECT_EQ(verdict["num_joined"].get<size_t>() + verdict["missing"].size(), size_t{kNumImages});
+  EXPECT_EQ(verdict["num_images"], kNumLineImages);
+  EXPECT_EQ(verdict["num_joined"].get<size_t>() + verdict["missing"].size(), size_t{kNumLineImages});
   EXPECT_EQ(verdict["num_joined"].get<size_t>(),
             json["num_images"].get<size_t>() + json["num_queries"].get<size_t>())
       << "held-out images are joined, too";
@@ -222,7 +222,7 @@ TEST_F(ReconstructLine, ASessionWithoutPosesJoinsOneThatHasSome) {
   std::vector<Reject> rejects;
   std::vector<CaptureImage> all = *ReadImagesText(Path("posed/images.txt"), &rejects), old;
   for (const char* folder : {"old/images", "new"}) fs::create_directories(Path(folder));
-  for (int i = 0; i < kNumImages; ++i) {
+  for (int i = 0; i < kNumLineImages; ++i) {
     const CaptureImage& image = all[kFirstImage + i];
     const bool is_old = i % 2 == 0;
     fs::copy_file(Path("posed/images/" + image.name), Path((is_old ? "old/images/" : "new/") + image.name));
@@ -243,7 +243,7 @@ TEST_F(ReconstructLine, ASessionWithoutPosesJoinsOneThatHasSome) {
   EXPECT_THAT(run.out, HasSubstr("6 of 6 images of new are joined to the other captures"));
   const auto poses = ReadCapture(Path("both.build/poses"));
   ASSERT_TRUE(poses.ok()) << poses.error().message;
-  ASSERT_EQ(poses->images.size(), static_cast<size_t>(kNumImages));
+  ASSERT_EQ(poses->images.size(), static_cast<size_t>(kNumLineImages));
   for (const CaptureImage& image : poses->images) {
     const bool is_old = image.name.starts_with("old/");
     const Pose& truth = truth_.at(image.name.substr(4));

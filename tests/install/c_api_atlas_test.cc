@@ -20,11 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const PosterWings& Wings() {
-  static const PosterWings wings;
-  return wings;
-}
-
 // An atlas of the map of two wings and of the same wings on another floor.
 class CAtlas : public testing::Test {
  protected:

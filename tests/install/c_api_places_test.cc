@@ -23,11 +23,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-const PosterWings& Wings() {
-  static const PosterWings wings;
-  return wings;
-}
-
 // The map of two wings, in C and in C++.  It is closed in C before a test uses what was made of it, unless
 // the test needs it.
 class CPlaces : public testing::Test {

@@ -26,7 +26,7 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<LaserStep>& Drive() {
+const std::vector<LaserStep>& DriveByLaser() {
   static const std::vector<LaserStep> drive = LaserDrive();
   return drive;
 }
@@ -127,7 +127,7 @@ TEST_F(CPlan, AScanIsLocatedAsInCxxBitForBit) {
   ASSERT_EQ(cairn_plan_close(plan_), CAIRN_OK);  // the locator keeps what it needs
   plan_ = nullptr;
   const ScanLocator locator = *ScanLocator::Make(*views_, {});
-  for (const LaserStep& step : Drive()) {
+  for (const LaserStep& step : DriveByLaser()) {
     const cairn_scan scan = ScanOf(step.scan);
     int32_t num_places = -1, is_complete = -1;
     ASSERT_EQ(cairn_scan_locator_locate(locator_, &scan, &num_places, &is_complete), CAIRN_OK)
@@ -154,7 +154,7 @@ TEST_F(CPlan, AScanIsLocatedAsInCxxBitForBit) {
 
 // Angles one by one are those of equal steps, and may be any.
 TEST_F(CPlan, BeamsMayHaveAnglesOfTheirOwn) {
-  RangeScan scan = Drive()[0].scan;
+  RangeScan scan = DriveByLaser()[0].scan;
   int32_t num_places = 0;
   cairn_plan_place equal = CAIRN_PLAN_PLACE_INIT, each = CAIRN_PLAN_PLACE_INIT, other = CAIRN_PLAN_PLACE_INIT;
   cairn_scan given = ScanOf(scan);
@@ -189,8 +189,8 @@ TEST_F(CPlan, ARobotIsFollowedAsInCxxBitForBit) {
   ASSERT_EQ(cairn_plan_tracker_places(tracker_, &num_places, &elsewhere), CAIRN_OK);
   EXPECT_EQ(num_places, 0);  // anywhere
   EXPECT_EQ(elsewhere, 1);
-  for (size_t i = 0; i < Drive().size(); ++i) {
-    const LaserStep& step = Drive()[i];
+  for (size_t i = 0; i < DriveByLaser().size(); ++i) {
+    const LaserStep& step = DriveByLaser()[i];
     if (i > 0) {
       ASSERT_EQ(cairn_plan_tracker_move(tracker_, step.moved.way_m.x(), step.moved.way_m.y(),
                                         step.moved.turn_left_rad),
@@ -204,8 +204,8 @@ TEST_F(CPlan, ARobotIsFollowedAsInCxxBitForBit) {
     ExpectBelieves(tracker.belief().places(), tracker.belief().elsewhere());
   }
   const cairn_plan_place place = Place(0);
-  EXPECT_LT((Eigen::Vector2d(place.position_m) - Drive().back().robot.position).norm(), 0.05);
-  EXPECT_NEAR(place.heading_rad, Drive().back().robot.heading_rad, 0.02);
+  EXPECT_LT((Eigen::Vector2d(place.position_m) - DriveByLaser().back().robot.position).norm(), 0.05);
+  EXPECT_NEAR(place.heading_rad, DriveByLaser().back().robot.heading_rad, 0.02);
   EXPECT_GT(place.probability, 0.99);
   EXPECT_EQ(place.explained_ratio, 0);
 }
@@ -214,7 +214,7 @@ TEST_F(CPlan, ARobotIsFollowedAsInCxxBitForBit) {
 TEST_F(CPlan, PosesOfWheelsMoveItAsTheirDifferences) {
   PlanarPose wheels{{30, -7}, 2.5};
   RobotOnPlan robot = *RobotOnPlan::Make(views_);
-  for (const LaserStep& step : Drive()) {
+  for (const LaserStep& step : DriveByLaser()) {
     wheels = wheels * PlanarPose{step.moved.way_m, step.moved.turn_left_rad};
     ASSERT_EQ(
         cairn_plan_tracker_move_to(tracker_, wheels.position.x(), wheels.position.y(), wheels.heading_rad),
@@ -225,7 +225,7 @@ TEST_F(CPlan, PosesOfWheelsMoveItAsTheirDifferences) {
     ASSERT_TRUE(robot.SeeScan(step.scan).ok());
     ExpectBelieves(robot.Places(), robot.elsewhere());
   }
-  EXPECT_LT((Eigen::Vector2d(Place(0).position_m) - Drive().back().robot.position).norm(), 0.05);
+  EXPECT_LT((Eigen::Vector2d(Place(0).position_m) - DriveByLaser().back().robot.position).norm(), 0.05);
 }
 
 // A laser behind the axle that looks back: places and motions are the robot's.
@@ -382,7 +382,7 @@ TEST_F(CPlan, OtherSensesSayTheirPlaces) {
 }
 
 TEST_F(CPlan, ScansThatCannotBeAreRefusedAndChangeNothing) {
-  const RangeScan& good = Drive()[0].scan;
+  const RangeScan& good = DriveByLaser()[0].scan;
   ASSERT_EQ(See(good), CAIRN_OK);
   const cairn_plan_place before = Place(0);
   const auto refuse = [&](const cairn_scan* scan, int32_t code, const char* words) {
@@ -447,7 +447,7 @@ TEST_F(CPlan, MotionsThatAreNotFiniteAreRefused) {
   EXPECT_EQ(cairn_plan_tracker_move_to(tracker_, 0, 0, std::nan("")), CAIRN_INVALID_ARGUMENT);
   EXPECT_THAT(cairn_last_error(), HasSubstr("not finite"));
   // The one that was refused is not where the wheels were.
-  ASSERT_EQ(See(Drive()[0].scan), CAIRN_OK);
+  ASSERT_EQ(See(DriveByLaser()[0].scan), CAIRN_OK);
   const double x = Place(0).position_m[0];
   ASSERT_EQ(cairn_plan_tracker_move_to(tracker_, 100, 50, 1), CAIRN_OK);
   EXPECT_EQ(cairn_plan_tracker_move_to(tracker_, HUGE_VAL, 50, 1), CAIRN_INVALID_ARGUMENT);
@@ -456,7 +456,7 @@ TEST_F(CPlan, MotionsThatAreNotFiniteAreRefused) {
 }
 
 TEST_F(CPlan, OptionsAreThoseThatAreReadAndBeginAnew) {
-  ASSERT_EQ(See(Drive()[0].scan), CAIRN_OK);
+  ASSERT_EQ(See(DriveByLaser()[0].scan), CAIRN_OK);
   const auto num_places = [&] {
     int32_t num = -1;
     EXPECT_EQ(cairn_plan_tracker_places(tracker_, &num, nullptr), CAIRN_OK);
@@ -471,12 +471,12 @@ TEST_F(CPlan, OptionsAreThoseThatAreReadAndBeginAnew) {
   EXPECT_GT(num_places(), 0);  // as before
   ASSERT_EQ(cairn_plan_tracker_set_option(tracker_, "max_num_places", "1"), CAIRN_OK) << cairn_last_error();
   EXPECT_EQ(num_places(), 0);  // anew
-  ASSERT_EQ(See(Drive()[0].scan), CAIRN_OK);
+  ASSERT_EQ(See(DriveByLaser()[0].scan), CAIRN_OK);
   EXPECT_EQ(num_places(), 1);
   // Beams of more than this met nothing: then too few met something.
   ASSERT_EQ(cairn_plan_tracker_set_option(tracker_, "max_range_m", "0.1"), CAIRN_OK) << cairn_last_error();
-  EXPECT_EQ(See(Drive()[0].scan), CAIRN_NO_DATA);
-  const cairn_scan scan = ScanOf(Drive()[0].scan);
+  EXPECT_EQ(See(DriveByLaser()[0].scan), CAIRN_NO_DATA);
+  const cairn_scan scan = ScanOf(DriveByLaser()[0].scan);
   int32_t num = 0;
   ASSERT_EQ(cairn_scan_locator_set_option(locator_, "max_range_m", "0.1"), CAIRN_OK) << cairn_last_error();
   EXPECT_EQ(cairn_scan_locator_locate(locator_, &scan, &num, nullptr), CAIRN_NO_DATA);
@@ -504,7 +504,7 @@ TEST_F(CPlan, HandlesAndStructsAreChecked) {
   EXPECT_EQ(cairn_scan_locator_create(nullptr, &locator), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(locator, nullptr);
   EXPECT_EQ(cairn_scan_locator_create(plan_, nullptr), CAIRN_INVALID_ARGUMENT);
-  const cairn_scan scan = ScanOf(Drive()[0].scan);
+  const cairn_scan scan = ScanOf(DriveByLaser()[0].scan);
   EXPECT_EQ(cairn_scan_locator_locate(nullptr, &scan, &num, nullptr), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_scan_locator_locate(locator_, &scan, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_scan_locator_locate(reinterpret_cast<cairn_scan_locator*>(tracker_), &scan, &num, nullptr),
@@ -544,7 +544,7 @@ TEST_F(CPlan, TwoThreadsAtOnceAreBusy) {
   for (int i = 0; i < 4; ++i) {
     threads.emplace_back([&] {
       for (int repeat = 0; repeat < 5; ++repeat) {
-        const int32_t code = See(Drive()[0].scan);
+        const int32_t code = See(DriveByLaser()[0].scan);
         ++(code == CAIRN_OK ? num_ok : code == CAIRN_BUSY ? num_busy : num_other);
       }
     });

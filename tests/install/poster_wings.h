@@ -82,4 +82,9 @@ class PosterWings {
   std::vector<cv::Mat> pictures_;
 };
 
+inline const PosterWings& Wings() {
+  static const PosterWings wings;
+  return wings;
+}
+
 }  // namespace cairn

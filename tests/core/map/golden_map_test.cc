@@ -16,7 +16,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string MapPath(const std::string& name) { return testing::TempDir() + "/golden_" + name; }
+std::string GoldenPath(const std::string& name) { return testing::TempDir() + "/golden_" + name; }
 
 // Version 1.0 as the program of that version wrote the example.
 TEST(GoldenMap, Version1IsMigrated) {
@@ -25,8 +25,8 @@ TEST(GoldenMap, Version1IsMigrated) {
   EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("cairn migrate"));
   const Result<MapRows> old = ReadMapRowsVersion1(path);
   ASSERT_TRUE(old.ok()) << old.error().message;
-  ASSERT_TRUE(WriteMapRows(*old, MapPath("migrated.cairn")).ok());
-  const Result<MapRows> migrated = ReadMapRows(MapPath("migrated.cairn"));
+  ASSERT_TRUE(WriteMapRows(*old, GoldenPath("migrated.cairn")).ok());
+  const Result<MapRows> migrated = ReadMapRows(GoldenPath("migrated.cairn"));
   ASSERT_TRUE(migrated.ok()) << migrated.error().message;
   EXPECT_EQ(migrated->name, "example");
   EXPECT_EQ(migrated->writer, "cairn test");
@@ -38,7 +38,7 @@ TEST(GoldenMap, Version1IsMigrated) {
   EXPECT_NEAR(migrated->landmarks[0].position.x(), 2.1234, 1e-12);
   EXPECT_EQ(migrated->descriptors, old->descriptors);
   EXPECT_EQ(migrated->vocabulary.inverted_files, old->vocabulary.inverted_files);
-  EXPECT_EQ(ReadMapRowsVersion1(MapPath("migrated.cairn")).error().code, ErrorCode::kTooNew);
+  EXPECT_EQ(ReadMapRowsVersion1(GoldenPath("migrated.cairn")).error().code, ErrorCode::kTooNew);
 }
 
 // Version 2.0 as the program of that version wrote the example.
@@ -106,11 +106,11 @@ TEST(GoldenMap, Version2_4IsRead) {
   EXPECT_EQ(rows->visual_map.focal_px, visual_map.focal_px);
   EXPECT_EQ(rows->visual_map.landmarks[2][1].sights, visual_map.landmarks[2][1].sights);
   // A changed finding is seen all the same.
-  std::filesystem::copy_file(GOLDEN_DIR "/map_2.4.cairn", MapPath("changed_2.4.cairn"),
+  std::filesystem::copy_file(GOLDEN_DIR "/map_2.4.cairn", GoldenPath("changed_2.4.cairn"),
                              std::filesystem::copy_options::overwrite_existing);
-  SQLite::Database(MapPath("changed_2.4.cairn"), SQLite::OPEN_READWRITE)
+  SQLite::Database(GoldenPath("changed_2.4.cairn"), SQLite::OPEN_READWRITE)
       .exec("UPDATE drop_reasons SET num_dropped = 199");
-  EXPECT_EQ(ReadMapRows(MapPath("changed_2.4.cairn")).error().code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ReadMapRows(GoldenPath("changed_2.4.cairn")).error().code, ErrorCode::kCorrupt);
 }
 
 // Version 2.5 as the program of that version wrote and signed it, of epoch 3.

@@ -21,7 +21,7 @@ using testing::ElementsAre;
 using testing::Pair;
 using testing::SizeIs;
 
-MapRows ExampleRows() {
+MapRows RowsOfAllBlocks() {
   const EmitExample example = MakeEmitExample();
   MapRows rows =
       *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
@@ -96,7 +96,7 @@ TEST(MapLayout, BlocksOfManyPostingsAreSmall) {
 }
 
 TEST(MapLayout, BlocksKnowTheirRegionsAndImages) {
-  const MapRows rows = ExampleRows();
+  const MapRows rows = RowsOfAllBlocks();
   const MapLayout layout(rows);
   for (const BlockEntry& entry : layout.entries()) {
     if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks)) {
@@ -113,7 +113,7 @@ TEST(MapLayout, BlocksKnowTheirRegionsAndImages) {
 
 // Every block of the example as bytes, with the directory that goes with them.
 struct EncodedBlocks {
-  MapRows rows = ExampleRows();
+  MapRows rows = RowsOfAllBlocks();
   MapDirectory directory;
   std::vector<std::string> bytes;
 

@@ -51,12 +51,12 @@ MapRows RowsWithFindings() {
   return rows;
 }
 
-std::string MapPath(const std::string& name) { return testing::TempDir() + "/findings_" + name; }
+std::string FindingsPath(const std::string& name) { return testing::TempDir() + "/findings_" + name; }
 
 TEST(MapFindings, RoundTripKeepsEverything) {
   const MapRows rows = RowsWithFindings();
-  ASSERT_TRUE(WriteMapRows(rows, MapPath("round.cairn")).ok());
-  const Result<MapRows> read = ReadMapRows(MapPath("round.cairn"));
+  ASSERT_TRUE(WriteMapRows(rows, FindingsPath("round.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(FindingsPath("round.cairn"));
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->findings, rows.findings);
 }
@@ -65,7 +65,7 @@ TEST(MapFindings, RowsThatCannotBeAreNotWritten) {
   const auto error_of = [](const RegionSelfTest& row) {
     MapRows rows = RowsWithFindings();
     rows.findings.self_test_regions = {row};
-    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    const Status status = WriteMapRows(rows, FindingsPath("never.cairn"));
     EXPECT_FALSE(status.ok());
     return status.ok() ? "" : status.error().message;
   };
@@ -80,7 +80,7 @@ TEST(MapFindings, PromisesThatCannotBeAreNotWritten) {
   const auto error_of = [](const std::function<void(MapPromise*)>& change) {
     MapRows rows = RowsWithFindings();
     change(&*rows.findings.promise);
-    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    const Status status = WriteMapRows(rows, FindingsPath("never.cairn"));
     EXPECT_FALSE(status.ok());
     return status.ok() ? "" : status.error().message;
   };
@@ -123,7 +123,7 @@ TEST(MapFindings, ChangesThatCannotBeAreNotWritten) {
   const auto error_of = [](const std::function<void(MapRows*)>& change) {
     MapRows rows = RowsWithFindings();
     change(&rows);
-    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    const Status status = WriteMapRows(rows, FindingsPath("never.cairn"));
     EXPECT_FALSE(status.ok());
     return status.ok() ? "" : status.error().message;
   };
@@ -160,15 +160,15 @@ TEST(MapFindings, ChangesThatCannotBeAreNotWritten) {
 // kept.
 TEST(MapFindings, WithoutChangesThereIsNoTableOfThem) {
   const auto has_table = [](const MapRows& rows) {
-    EXPECT_TRUE(WriteMapRows(rows, MapPath("unchanged.cairn")).ok());
-    SQLite::Database database(MapPath("unchanged.cairn"), SQLite::OPEN_READONLY);
+    EXPECT_TRUE(WriteMapRows(rows, FindingsPath("unchanged.cairn")).ok());
+    SQLite::Database database(FindingsPath("unchanged.cairn"), SQLite::OPEN_READONLY);
     return HasTable(database, "changes");
   };
   MapRows rows = RowsWithFindings();
   EXPECT_TRUE(has_table(rows));
   rows.findings.changes.clear();
   EXPECT_FALSE(has_table(rows));
-  EXPECT_THAT(ReadMapRows(MapPath("unchanged.cairn"))->findings.changes, IsEmpty());
+  EXPECT_THAT(ReadMapRows(FindingsPath("unchanged.cairn"))->findings.changes, IsEmpty());
 }
 
 TEST(MapPromise, CountsTheNodesThatKeepIt) { EXPECT_EQ(RowsWithFindings().findings.promise->NumKept(), 1); }
@@ -225,12 +225,12 @@ TEST(MapFindings, DamagedRowsAreRefused) {
         "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
         "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
         "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
-    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("damaged.cairn")).ok());
-    SQLite::Database(MapPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
-    const Result<MapRows> read = ReadMapRows(MapPath("damaged.cairn"));
+    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), FindingsPath("damaged.cairn")).ok());
+    SQLite::Database(FindingsPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapRows> read = ReadMapRows(FindingsPath("damaged.cairn"));
     ASSERT_FALSE(read.ok()) << sql;
     EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
-    std::filesystem::remove(MapPath("damaged.cairn"));
+    std::filesystem::remove(FindingsPath("damaged.cairn"));
   }
 }
 
@@ -261,9 +261,10 @@ TEST(MapFindings, ChangedOrMissingFindingsAreRefused) {
         "UPDATE drop_reasons SET num_dropped = num_dropped + 1", "DROP TABLE promises", "DROP TABLE changes",
         "UPDATE changes SET num_vanished = num_vanished + 1 WHERE change_idx = 0",
         "UPDATE promises SET shape = shape + 1"}) {
-    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("changed.cairn")).ok());
-    SQLite::Database(MapPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
-    const Result<MapFile> file = MapFile::Open(MapPath("changed.cairn"), {});  // which does not read them
+    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), FindingsPath("changed.cairn")).ok());
+    SQLite::Database(FindingsPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapFile> file =
+        MapFile::Open(FindingsPath("changed.cairn"), {});  // which does not read them
     ASSERT_TRUE(file.ok()) << file.error().message;
     EXPECT_EQ(file->ReadFindings().error().code, ErrorCode::kCorrupt) << sql;
   }

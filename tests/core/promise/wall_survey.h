@@ -42,6 +42,13 @@ inline void AddClass(const Eigen::Vector3d& position, const std::vector<ImageId>
   classes->classes.push_back(feature_class);
 }
 
+// Cameras in a row that look at a wall `depth` away: what is within a tenth of that is one view.
+inline Classes Row(int num_images, double spacing, double depth) {
+  Classes classes = WallSurvey(num_images, spacing);
+  AddClass({0, 0, depth}, {1}, 3, &classes);
+  return classes;
+}
+
 // Classes all along the wall, each seen by about a part `ratio` of the images that look at it; those with an
 // odd number by the lesser part `odd_ratio`.
 inline Classes RandomWallSurvey(int num_images, double spacing, int num_classes, double ratio,

@@ -11,14 +11,14 @@
 namespace cairn {
 namespace {
 
-const SyntheticRoom& Room() {
+const SyntheticRoom& ModelRoom() {
   static const SyntheticRoom room = MakeSyntheticRoom(1);
   return room;
 }
 
 // Every survey image is a node.
 std::shared_ptr<const Map> RoomMap() {
-  MapRows rows = Room().rows;
+  MapRows rows = ModelRoom().rows;
   for (int32_t i = 0; i < static_cast<int32_t>(rows.images.size()); ++i)
     rows.appearance.push_back({.images = {i}, .is_kept = true});
   return *Map::FromRows(std::move(rows));
@@ -35,10 +35,10 @@ TEST(PlaceModel, CloserLookFindsTheNearestViewMoreOften) {
   double by_words = 0, closer = 0;
   for (int trial = 0; trial < 12; ++trial) {
     const Pose truth = RandomPose(random);
-    const Query query =
-        MakeQuery(RenderFeatures(Room(), truth, {}, 50 + trial), Room().camera, MeasurementOptions());
+    const Query query = MakeQuery(RenderFeatures(ModelRoom(), truth, {}, 50 + trial), ModelRoom().camera,
+                                  MeasurementOptions());
     const auto distance = [&](const PlaceScores& places) {
-      return CenterErrorM(Room().rows.images[Best(places.probabilities)].cam_from_world, truth);
+      return CenterErrorM(ModelRoom().rows.images[Best(places.probabilities)].cam_from_world, truth);
     };
     const PlaceScores places = *model.LookCloser(*map, query);
     double sum = 0;
@@ -55,12 +55,12 @@ TEST(PlaceModel, CloserLookFindsTheNearestViewMoreOften) {
 TEST(PlaceModel, CloserLookKeepsTheWordsWhereNothingIsVerified) {
   const auto map = RoomMap();
   const PlaceModel model = *PlaceModel::Make(*map);
-  Features few = RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {.num_outliers = 0}, 3);
+  Features few = RenderFeatures(ModelRoom(), PoseAt({1, 0.5, 1.2}, 20), {.num_outliers = 0}, 3);
   few.keypoints.resize(10);
   few.descriptors.conservativeResize(10, Eigen::NoChange);
-  const Query query = MakeQuery(few, Room().camera, {});
+  const Query query = MakeQuery(few, ModelRoom().camera, {});
   EXPECT_EQ(model.LookCloser(*map, query)->scores, model.Look(few.descriptors).scores);
-  const Query blank = MakeQuery({}, Room().camera, {});
+  const Query blank = MakeQuery({}, ModelRoom().camera, {});
   const PlaceScores nothing = *model.LookCloser(*map, blank);
   for (const double p : nothing.probabilities) EXPECT_NEAR(p, 1.0 / model.num_nodes(), 1e-12);
   RerankOptions none;
@@ -73,10 +73,10 @@ TEST(PlaceModel, CloserLookKeepsTheWordsWhereNothingIsVerified) {
 TEST(PlaceModel, ViewsOfImagesShowTheirLandmarks) {
   const auto map = RoomMap();
   const PlaceView view = *ViewOfImage(*map, 5);
-  const MapImage& image = Room().rows.images[5];
+  const MapImage& image = ModelRoom().rows.images[5];
   ASSERT_EQ(view.bearings.size(), image.landmarks.size());
   EXPECT_EQ(view.packed.size(), static_cast<int>(image.landmarks.size()));
-  const Eigen::Vector3d point = image.cam_from_world * Room().points[image.landmarks[7]];
+  const Eigen::Vector3d point = image.cam_from_world * ModelRoom().points[image.landmarks[7]];
   EXPECT_LT((view.bearings[7] - point.normalized()).norm(), 1e-9);
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-ServoScene Room() {
+ServoScene EpipolesRoom() {
   ServoScene scene;
   scene.points = RoomPoints({-5, -3}, {5, 3}, 700, 1);
   return scene;
@@ -53,7 +53,7 @@ std::vector<PlanarPose> Places() {
 }
 
 TEST(PlanarEpipoles, AreExactForExactMatches) {
-  const ServoScene scene = Room();
+  const ServoScene scene = EpipolesRoom();
   const PlanarPose target;
   for (const PlanarPose& place : Places()) {
     const Truth truth = TruthOf(place, target);
@@ -67,7 +67,7 @@ TEST(PlanarEpipoles, AreExactForExactMatches) {
 }
 
 TEST(PlanarEpipoles, DoNotDependOnTheFrameOfTheFloor) {
-  const ServoScene scene = Room();
+  const ServoScene scene = EpipolesRoom();
   const PlanarPose target{{1, -0.5}, RadFromDeg(130)}, current{{1.6, -1.1}, RadFromDeg(112)};
   const Truth truth = TruthOf(current, target);
   const auto found = EstimatePlanarEpipoles(Rays(scene, current, target, 320), 320, {}, nullptr);
@@ -77,7 +77,7 @@ TEST(PlanarEpipoles, DoNotDependOnTheFrameOfTheFloor) {
 }
 
 TEST(PlanarEpipoles, SurviveNoiseAndFalseMatches) {
-  ServoScene scene = Room();
+  ServoScene scene = EpipolesRoom();
   scene.noise_px = 0.5;
   scene.outlier_ratio = 0.3;
   const PlanarPose target;
@@ -95,7 +95,7 @@ TEST(PlanarEpipoles, SurviveNoiseAndFalseMatches) {
 }
 
 TEST(PlanarEpipoles, LearnAWrongFocalLengthFromTheMatches) {
-  const ServoScene scene = Room();
+  const ServoScene scene = EpipolesRoom();
   const PlanarPose target, current{{-1.5, 0.6}, RadFromDeg(-20)};
   for (const double factor : {0.8, 1.2}) {
     const auto found =
@@ -124,7 +124,7 @@ TEST(PlanarEpipoles, AWallAndItsFloorAreEnough) {
 }
 
 TEST(PlanarEpipoles, WithoutBaselineTheTurnIsKnownAndTheDistanceIsNone) {
-  ServoScene scene = Room();
+  ServoScene scene = EpipolesRoom();
   scene.noise_px = 0.5;
   const PlanarPose target, current{{0, 0}, RadFromDeg(17)};
   const auto found = EstimatePlanarEpipoles(Rays(scene, current, target, 320), 320, {}, nullptr);
@@ -134,7 +134,7 @@ TEST(PlanarEpipoles, WithoutBaselineTheTurnIsKnownAndTheDistanceIsNone) {
 }
 
 TEST(PlanarEpipoles, TheDistanceIsInUnitsOfTheScenes) {
-  const ServoScene scene = Room();
+  const ServoScene scene = EpipolesRoom();
   const PlanarPose target, near{{-0.5, 0}, 0}, far{{-1, 0}, 0};
   const auto one = EstimatePlanarEpipoles(Rays(scene, near, target, 320), 320, {}, nullptr);
   const auto two = EstimatePlanarEpipoles(Rays(scene, far, target, 320), 320, {}, nullptr);
@@ -176,7 +176,7 @@ TEST(PlanarEpipoles, RefusesBadOptionsAndCameras) {
 }
 
 TEST(PlanarEpipoles, MarksMatchesThatAreNotFiniteAsOutliers) {
-  const ServoScene scene = Room();
+  const ServoScene scene = EpipolesRoom();
   const PlanarPose target, current{{-1, 0.3}, 0.1};
   std::vector<RayPair> rays = Rays(scene, current, target, 320);
   rays.insert(rays.begin(), {{kNan, 0}, {0, 0}});

@@ -8,14 +8,16 @@
 namespace cairn {
 namespace {
 
-SureTracker Make(const SureTrackerOptions& options) { return *SureTracker::Make(RoomMap(), {}, {}, options); }
+SureTracker MakeSure(const SureTrackerOptions& options) {
+  return *SureTracker::Make(RoomMap(), {}, {}, options);
+}
 
 Localization Show(SureTracker* tracker, const Pose& pose, int frame) {
   return *tracker->TrackFeatures(RenderFeatures(Room(), pose, {}, 500 + frame), Room().camera);
 }
 
 TEST(SureTracker, WithoutAProbabilityItIsARegionTracker) {
-  SureTracker every = Make({});
+  SureTracker every = MakeSure({});
   RegionTracker plain(RoomMap());
   EXPECT_FALSE(every.belief());
   for (int i = 0; i < 3; ++i) {
@@ -36,7 +38,7 @@ TEST(SureTracker, WithoutAProbabilityItIsARegionTracker) {
 
 TEST(SureTracker, OdometryMovesItsTrackerAndItsBelief) {
   for (const double min_place_probability : {0.0, 0.9}) {
-    SureTracker over_floor = Make({.min_place_probability = min_place_probability});
+    SureTracker over_floor = MakeSure({.min_place_probability = min_place_probability});
     SureTracker in_space = over_floor;
     ASSERT_TRUE(Show(&over_floor, OnDrive(0), 0).has_fix());
     ASSERT_TRUE(Show(&in_space, OnDrive(0), 0).has_fix());
@@ -70,7 +72,7 @@ TEST(SureTracker, OptionsOfABeliefThatNobodyAskedForAreRefused) {
 
 TEST(SureTracker, AFixIsPublishedWhenItsPlaceIsSure) {
   // Nine of ten times it wakes up elsewhere, and one fix has odds of 100: 11 to 1.  The drive shows more.
-  SureTracker tracker = Make({.min_place_probability = 0.95, .belief = {.elsewhere_ratio = 0.9}});
+  SureTracker tracker = MakeSure({.min_place_probability = 0.95, .belief = {.elsewhere_ratio = 0.9}});
   const Localization first = Show(&tracker, OnDrive(0), 0);
   EXPECT_EQ(first.reason, NoFix::kImprobable);
   EXPECT_NEAR(first.probability, 0.99 * 100 / 109, 0.03);
@@ -85,12 +87,12 @@ TEST(SureTracker, AFixIsPublishedWhenItsPlaceIsSure) {
   }
   EXPECT_GT(first_published, 0);
   // At once, where less is asked for.
-  SureTracker bold = Make({.min_place_probability = 0.9});
+  SureTracker bold = MakeSure({.min_place_probability = 0.9});
   EXPECT_TRUE(Show(&bold, OnDrive(0), 0).has_fix());
 }
 
 TEST(SureTracker, WhileItIsSureFramesAreLookedAtAnewBySeconds) {
-  SureTracker tracker = Make({.min_place_probability = 0.9, .look_anew_s = 1});
+  SureTracker tracker = MakeSure({.min_place_probability = 0.9, .look_anew_s = 1});
   std::vector<double> probabilities;
   for (int i = 0; i < 25; ++i) {
     ASSERT_TRUE(tracker.Elapse(0.1).ok());
@@ -106,7 +108,8 @@ TEST(SureTracker, WhileItIsSureFramesAreLookedAtAnewBySeconds) {
 }
 
 TEST(SureTracker, WhatGravityContradictsIsNotPublished) {
-  SureTracker upright = Make({.min_place_probability = 0.9}), tilted = Make({.min_place_probability = 0.9});
+  SureTracker upright = MakeSure({.min_place_probability = 0.9}),
+              tilted = MakeSure({.min_place_probability = 0.9});
   for (int i = 0; i < 4; ++i) {
     ASSERT_TRUE(upright.SenseUp({0, -1, 0}, 2).ok());
     EXPECT_TRUE(Show(&upright, OnDrive(i), i).has_fix());
@@ -118,7 +121,7 @@ TEST(SureTracker, WhatGravityContradictsIsNotPublished) {
 }
 
 TEST(SureTracker, ACarriedRobotIsPublishedAgainWhenItIsSure) {
-  SureTracker tracker = Make({.min_place_probability = 0.9});
+  SureTracker tracker = MakeSure({.min_place_probability = 0.9});
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(Show(&tracker, OnDrive(i), i).has_fix());
   const auto [opposite, num_withheld] = [&] {
     int withheld = 0;

@@ -11,12 +11,6 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-decompose_views::DecomposeViewsOptions FineGrid() {
-  decompose_views::DecomposeViewsOptions options;
-  options.clean.grid_m = 1e-6;
-  return options;
-}
-
 MinimumLinkPath FewestLinks(const std::string& text, const Vec2& from, const Vec2& to, double radius_m) {
   const Views views = decompose_views::Decomposed(text).views;
   const PlanSpace space(views);
@@ -109,7 +103,7 @@ TEST(MinimumLinkPath, IsNotBelowBruteForceNorAboveIt) {
   for (uint64_t seed = 0; seed < 120; ++seed) {
     Random random(MixSeed(23, seed));
     const PlanOracle oracle(RandomWalls(random, static_cast<int>(random.UniformInt(4, 10)), kSize));
-    const Views views = decompose_views::Decomposed(oracle.Text(), FineGrid()).views;
+    const Views views = decompose_views::Decomposed(oracle.Text(), decompose_views::FineGrid()).views;
     const PlanSpace space(views);
     for (const double radius : {0.0, random.Uniform(0.05, 0.3)}) {
       const Vec2 from(random.Uniform(-0.8, kSize + 0.8), random.Uniform(-0.8, kSize + 0.8));

@@ -14,13 +14,6 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// Rounding far below a hair's breadth of the oracle.
-decompose_views::DecomposeViewsOptions FineGrid() {
-  decompose_views::DecomposeViewsOptions options;
-  options.clean.grid_m = 1e-6;
-  return options;
-}
-
 Vec2 RandomPlace(Random& random, int size) {
   return {random.Uniform(-0.8, size + 0.8), random.Uniform(-0.8, size + 0.8)};
 }
@@ -51,7 +44,7 @@ TEST(PlanProperty, APointGoesTheShortestWayThatBruteForceFinds) {
   for (uint64_t seed = 0; seed < kNumSeeds; ++seed) {
     Random random(MixSeed(17, seed));
     const PlanOracle oracle(RandomWalls(random, static_cast<int>(random.UniformInt(3, 14)), kSize));
-    const Views views = Decomposed(oracle.Text(), FineGrid()).views;
+    const Views views = Decomposed(oracle.Text(), decompose_views::FineGrid()).views;
     const PlanSpace space(views);
     for (int i = 0; i < 4; ++i) {
       const Vec2 from = RandomPlace(random, kSize), to = RandomPlace(random, kSize);
@@ -85,7 +78,7 @@ TEST(PlanProperty, ADiscGoesTheShortestWayUpToItsPolygon) {
   for (uint64_t seed = 0; seed < kNumSeeds; ++seed) {
     Random random(MixSeed(18, seed));
     const PlanOracle oracle(RandomWalls(random, static_cast<int>(random.UniformInt(3, 14)), kSize));
-    const Views views = Decomposed(oracle.Text(), FineGrid()).views;
+    const Views views = Decomposed(oracle.Text(), decompose_views::FineGrid()).views;
     const PlanSpace space(views);
     const double radius = random.Uniform(0.05, 0.5);
     const Vec2 from = RandomPlace(random, kSize), to = RandomPlace(random, kSize);
@@ -130,7 +123,7 @@ TEST(PlanProperty, ASearchReachesWhatAShortPathReaches) {
   for (uint64_t seed = 0; seed < 60; ++seed) {
     Random random(MixSeed(19, seed));
     const PlanOracle oracle(RandomWalls(random, 7, kSize));
-    const Views views = Decomposed(oracle.Text(), FineGrid()).views;
+    const Views views = Decomposed(oracle.Text(), decompose_views::FineGrid()).views;
     const PlanSpace space(views);
     const Vec2 from = RandomPlace(random, kSize);
     if (space.FaceAt(from) < 0) continue;

@@ -10,18 +10,18 @@
 namespace cairn {
 namespace {
 
-struct Surveyed {
+struct SurveyedRoom {
   VisualRoom room;
   std::shared_ptr<const VisualMap> visual;
 
-  Surveyed() {
+  SurveyedRoom() {
     room.rows.visual_map = *emit_map::ModelLandmarks(room.classes, room.rows, {}, 1);
     visual = *VisualMap::Load(**Map::FromRows(room.rows));
   }
 };
 
-const Surveyed& Room() {
-  static const Surveyed surveyed;
+const SurveyedRoom& FilterRoom() {
+  static const SurveyedRoom surveyed;
   return surveyed;
 }
 
@@ -33,7 +33,7 @@ double EntropyOf(const std::vector<double>& shares) {
 
 Eigen::Vector2d MeanOf(const std::vector<double>& shares) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (size_t i = 0; i < shares.size(); ++i) mean += shares[i] * Room().visual->places()[i];
+  for (size_t i = 0; i < shares.size(); ++i) mean += shares[i] * FilterRoom().visual->places()[i];
   return mean;
 }
 
@@ -43,14 +43,14 @@ std::vector<SeenLandmark> FirstOf(std::vector<SeenLandmark> seen, size_t count) 
 }
 
 TEST(VisualFilter, StartsKnowingNothing) {
-  const std::vector<double> belief = VisualFilter(Room().visual).AtPlaces();
+  const std::vector<double> belief = VisualFilter(FilterRoom().visual).AtPlaces();
   for (const double share : belief) EXPECT_NEAR(share, 1.0 / 63, 1e-12);
 }
 
 TEST(VisualFilter, DrivesAlongWithTheRobotAndGrowsUnsure) {
-  VisualFilter filter(Room().visual);
+  VisualFilter filter(FilterRoom().visual);
   const Eigen::Vector2d start(2, 2);
-  ASSERT_TRUE(filter.See(Room().room.SeenLandmarks(VisualRoom::PoseAt(start, 0))).ok());
+  ASSERT_TRUE(filter.See(FilterRoom().room.SeenLandmarks(VisualRoom::PoseAt(start, 0))).ok());
   EXPECT_LT((MeanOf(filter.AtPlaces()) - start).norm(), 0.1);
   const double before = EntropyOf(filter.AtPlaces());
   // Half a metre ahead, looking along x; then a quarter turn and half a metre to what is now the right.
@@ -62,7 +62,7 @@ TEST(VisualFilter, DrivesAlongWithTheRobotAndGrowsUnsure) {
 }
 
 TEST(VisualFilter, ViewsThatAloneDoNotTellDoSoTogether) {
-  VisualFilter filter(Room().visual);
+  VisualFilter filter(FilterRoom().visual);
   Eigen::Vector2d at(1.75, 2);
   double first = 0;
   for (int step = 0; step < 6; ++step) {
@@ -70,7 +70,7 @@ TEST(VisualFilter, ViewsThatAloneDoNotTellDoSoTogether) {
       ASSERT_TRUE(filter.Move({0.25, 0}, 0).ok());
       at.x() += 0.25;
     }
-    const auto seen = FirstOf(Room().room.SeenLandmarks(VisualRoom::PoseAt(at, 0)), 2);
+    const auto seen = FirstOf(FilterRoom().room.SeenLandmarks(VisualRoom::PoseAt(at, 0)), 2);
     ASSERT_TRUE(filter.See(seen).ok());
     if (step == 0) first = EntropyOf(filter.AtPlaces());
   }
@@ -79,16 +79,16 @@ TEST(VisualFilter, ViewsThatAloneDoNotTellDoSoTogether) {
 }
 
 TEST(VisualFilter, FindsARobotThatWasCarriedAway) {
-  VisualFilter filter(Room().visual);
+  VisualFilter filter(FilterRoom().visual);
   for (int i = 0; i < 5; ++i)
-    ASSERT_TRUE(filter.See(Room().room.SeenLandmarks(VisualRoom::PoseAt({1.6, 1.4}, 0))).ok());
+    ASSERT_TRUE(filter.See(FilterRoom().room.SeenLandmarks(VisualRoom::PoseAt({1.6, 1.4}, 0))).ok());
   for (int i = 0; i < 2; ++i)
-    ASSERT_TRUE(filter.See(Room().room.SeenLandmarks(VisualRoom::PoseAt({3.3, 2.6}, 3))).ok());
+    ASSERT_TRUE(filter.See(FilterRoom().room.SeenLandmarks(VisualRoom::PoseAt({3.3, 2.6}, 3))).ok());
   EXPECT_LT((MeanOf(filter.AtPlaces()) - Eigen::Vector2d(3.3, 2.6)).norm(), 0.2);
 }
 
 TEST(VisualFilter, OdometryThatIsNoNumberIsAnError) {
-  VisualFilter filter(Room().visual);
+  VisualFilter filter(FilterRoom().visual);
   EXPECT_EQ(filter.Move({std::nan(""), 0}, 0).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(filter.Move({0, 0}, std::nan("")).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(filter.Move({1e200, 0}, 0).error().code, ErrorCode::kInvalidArgument);  // its square is infinite
@@ -99,8 +99,8 @@ TEST(VisualFilter, OdometryThatIsNoNumberIsAnError) {
 // Its kernel had as many bins as its standard deviation, 5 % of 1e12 rad: more than can be counted, and all
 // was forgotten.
 TEST(VisualFilter, ATurnOfManyCirclesLeavesTheHeadingOpenAndThePlaceKnown) {
-  VisualFilter filter(Room().visual);
-  ASSERT_TRUE(filter.See(Room().room.SeenLandmarks(VisualRoom::PoseAt({2, 2}, 0))).ok());
+  VisualFilter filter(FilterRoom().visual);
+  ASSERT_TRUE(filter.See(FilterRoom().room.SeenLandmarks(VisualRoom::PoseAt({2, 2}, 0))).ok());
   const std::vector<double> before = filter.AtPlaces();
   ASSERT_TRUE(filter.Move({0, 0}, 1e12).ok());
   const std::vector<double> after = filter.AtPlaces();

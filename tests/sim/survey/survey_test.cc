@@ -10,7 +10,7 @@
 namespace cairn::sim {
 namespace {
 
-SimulateOptions QuickOptions() {
+SimulateOptions CoarseTexels() {
   SimulateOptions options;
   options.texel_m = 0.03;
   return options;
@@ -31,7 +31,7 @@ TEST(MakePose, LooksAlongItsHeadingWithTheSkyAbove) {
 }
 
 TEST(PlanSurvey, ADriveReadByRowsGoesOnWhileItIsRead) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.survey = "driven";
   options.readout_ratio = 0.4;
   const Building building = *MakeBuilding(options, 0);
@@ -53,7 +53,7 @@ TEST(PlanSurvey, ADriveReadByRowsGoesOnWhileItIsRead) {
 }
 
 TEST(PlanSurvey, ACameraOfARigMovesAsTheRigDoes) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.survey = "driven";
   options.readout_ratio = 0.5;
   options.rig_num_cameras = 3;
@@ -79,7 +79,7 @@ TEST(PlanSurvey, ACameraOfARigMovesAsTheRigDoes) {
 }
 
 TEST(TakeImage, EachRowIsSeenFromWhereTheCameraIsThen) {
-  const SimulateOptions options = QuickOptions();
+  const SimulateOptions options = CoarseTexels();
   const Building building = *MakeBuilding(options, 0);
   Survey survey = *PlanSurvey(building, options, 0);
   PlannedImage image = survey.images[3];
@@ -105,7 +105,7 @@ TEST(TakeImage, EachRowIsSeenFromWhereTheCameraIsThen) {
 }
 
 TEST(PlanSurvey, PutsStationsOnTheLatticeInFreeSpace) {
-  const SimulateOptions options = QuickOptions();
+  const SimulateOptions options = CoarseTexels();
   const Building building = *MakeBuilding(options, 0);
   const Survey survey = *PlanSurvey(building, options, 0);
   ASSERT_EQ(survey.images.size(), 4 * survey.stations.size());
@@ -139,7 +139,7 @@ TEST(PlanSurvey, PutsStationsOnTheLatticeInFreeSpace) {
 // A robot can go from nearly any station of the demo to any other by steps along the lattice; a few stand in
 // corners that are reached in between only.
 TEST(PlanSurvey, ConnectsTheStationsOfTheDemo) {
-  const SimulateOptions options = QuickOptions();
+  const SimulateOptions options = CoarseTexels();
   const Survey survey = *PlanSurvey(*MakeBuilding(options, 0), options, 0);
   std::vector<size_t> stack = {0};
   std::set<size_t> reached = {0};
@@ -155,7 +155,7 @@ TEST(PlanSurvey, ConnectsTheStationsOfTheDemo) {
 }
 
 TEST(PlanSurvey, AsksFromFreePlacesOffTheLattice) {
-  const SimulateOptions options = QuickOptions();
+  const SimulateOptions options = CoarseTexels();
   const Building building = *MakeBuilding(options, 0);
   const Survey survey = *PlanSurvey(building, options, 0);
   ASSERT_EQ(survey.queries.size(), 93u);
@@ -171,7 +171,7 @@ TEST(PlanSurvey, AsksFromFreePlacesOffTheLattice) {
 }
 
 TEST(PlanSurvey, KeepsToThePartOfTheFloorAskedFor) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.width_m = 8, options.depth_m = 9.3, options.num_rooms = 2, options.corridor_width_m = 5;
   options.spacing_m = 0.25;
   options.survey_area_m = {0.8, 3.3, 7.0, 6.2};
@@ -187,14 +187,14 @@ TEST(PlanSurvey, KeepsToThePartOfTheFloorAskedFor) {
   }
   for (const std::vector<double>& bad : {std::vector<double>{1, 2, 3}, {3, 1, 1, 2}, {20, 20, 21, 21}}) {
     options.survey_area_m = bad;
-    const Result<Survey> none = PlanSurvey(*MakeBuilding(QuickOptions(), 0), options, 0);
+    const Result<Survey> none = PlanSurvey(*MakeBuilding(CoarseTexels(), 0), options, 0);
     ASSERT_FALSE(none.ok());
     EXPECT_NE(none.error().message.find("survey_area_m"), std::string::npos);
   }
 }
 
 TEST(PlanSurvey, SpoilsOnlyQueriesWithExposureAndBlur) {
-  const SimulateOptions options = QuickOptions();
+  const SimulateOptions options = CoarseTexels();
   const Survey survey = *PlanSurvey(*MakeBuilding(options, 0), options, 0);
   for (const PlannedImage& image : survey.images) {
     EXPECT_EQ(image.gain, 1);
@@ -217,7 +217,7 @@ TEST(PlanSurvey, SpoilsOnlyQueriesWithExposureAndBlur) {
 }
 
 TEST(PlanSurvey, StatesPosesWithTheNoiseAskedFor) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.pose_noise_m = 0.02;
   options.pose_noise_deg = 1;
   const Survey survey = *PlanSurvey(*MakeBuilding(options, 0), options, 0);
@@ -235,7 +235,7 @@ TEST(PlanSurvey, StatesPosesWithTheNoiseAskedFor) {
 }
 
 TEST(PlanSurvey, DrivesThroughAllRooms) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.survey = "driven";
   for (uint64_t seed = 0; seed < 4; ++seed) {
     const Building building = *MakeBuilding(options, seed);
@@ -259,7 +259,7 @@ TEST(PlanSurvey, DrivesThroughAllRooms) {
 }
 
 TEST(PlanSurvey, ADriveLikeAFilmTurnsLittleBetweenTwoImages) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.survey = "driven";
   options.num_queries = 0;
   const Building building = *MakeBuilding(options, 1);
@@ -273,7 +273,7 @@ TEST(PlanSurvey, ADriveLikeAFilmTurnsLittleBetweenTwoImages) {
 }
 
 TEST(PlanSurvey, AnotherRunDrivesElsewhereThroughAllRooms) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.survey = "driven";
   options.num_queries = 0;
   const Building building = *MakeBuilding(options, 1);
@@ -299,7 +299,7 @@ TEST(PlanSurvey, AnotherRunDrivesElsewhereThroughAllRooms) {
 }
 
 TEST(PlanSurvey, LightDarkensAllImages) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   options.light_ratio = 0.25;
   options.query_gain = 0;
   const Building building = *MakeBuilding(options, 0);
@@ -309,15 +309,15 @@ TEST(PlanSurvey, LightDarkensAllImages) {
 }
 
 TEST(PlanSurvey, SaysWhatLeavesNoPlace) {
-  const Building building = *MakeBuilding(QuickOptions(), 0);
-  SimulateOptions wide = QuickOptions();
+  const Building building = *MakeBuilding(CoarseTexels(), 0);
+  SimulateOptions wide = CoarseTexels();
   wide.spacing_m = 9;
   Result<Survey> survey = PlanSurvey(building, wide, 0);
   ASSERT_FALSE(survey.ok());
   EXPECT_EQ(survey.error().code, ErrorCode::kInvalidArgument);
   EXPECT_NE(survey.error().message.find("spacing_m"), std::string::npos);
   for (const char* kind : {"lattice", "driven"}) {
-    SimulateOptions shy = QuickOptions();
+    SimulateOptions shy = CoarseTexels();
     shy.clearance_m = 1.9;
     shy.survey = kind;
     survey = PlanSurvey(building, shy, 0);
@@ -328,7 +328,7 @@ TEST(PlanSurvey, SaysWhatLeavesNoPlace) {
 }
 
 TEST(TakeImage, AddsWhatIsPlannedAndNothingElse) {
-  SimulateOptions options = QuickOptions();
+  SimulateOptions options = CoarseTexels();
   const Building building = *MakeBuilding(options, 0);
   const Survey survey = *PlanSurvey(building, options, 0);
   const Renderer renderer(building, survey.camera);
