@@ -38,7 +38,7 @@ PACKAGES_SYSROOT := libc6-dev $(LIBRARIES) $(PACKAGES_PYTHON) $(LIBRARIES_TEST)
 SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all help program whole deps deps-all demo tables test test-arm64 bench reproduce maps compile install deb release sysroot sysroot-packages format format-check tidy docs clean
+.PHONY: all help program whole deps deps-all demo tables test test-arm64 mutation bench reproduce maps compile install deb release sysroot sysroot-packages format format-check tidy docs clean
 # Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
@@ -48,12 +48,12 @@ all: program  ## Build the program: build/release/cairn
 parts = -DCAIRN_BUILD_TESTS=$(1) -DCAIRN_BUILD_PYTHON=$(1) -DCAIRN_BUILD_ROS=$(1)
 
 program: deps build/$(PRESET)/build.ninja
-	@cmake --build build/$(PRESET) --target cairn
+	@cmake --build build/$(PRESET) --parallel $(shell nproc) --target cairn
 
 whole: NEW_PARTS := ON
 whole: deps-all build/$(PRESET)/build.ninja
 	@grep -q CAIRN_BUILD_TESTS:BOOL=ON build/$(PRESET)/CMakeCache.txt || cmake --preset $(PRESET) $(call parts,ON)
-	@cmake --build build/$(PRESET)
+	@cmake --build build/$(PRESET) --parallel $(shell nproc)
 
 # A new build folder has the parts that are asked for; one that is there keeps those that it has.
 NEW_PARTS := OFF
@@ -79,8 +79,14 @@ tables: program  ## Localize held-out images and images of other places in three
 test: whole  ## Build all and run all tests
 	@ctest --preset $(PRESET) --parallel $(shell nproc)
 
-test-arm64: whole  ## Of these tests those of 64-bit ARM alone: build packages and tests, run them in an emulator
-	@ctest --test-dir build/$(PRESET) --tests-regex '^Arm64' --output-on-failure
+test-arm64: whole  ## Build packages and tests for 64-bit ARM, and run them in an emulator
+	@CAIRN_ARM64=1 ctest --test-dir build/$(PRESET) --tests-regex '^Arm64' --output-on-failure
+
+# Changes to try, and what draws them.
+NUM ?= 100
+SEED ?= 0
+mutation: whole  ## Change sources of ROOM=core/seal one operator at a time: which changes does no test notice? NUM=100 SEED=0
+	@/usr/bin/python3 -B tests/mutation/mutation.py build/$(PRESET) $(ROOM) --num $(NUM) --seed $(SEED)
 
 bench: whole  ## Build and run the benchmarks
 	@cmake --preset $(PRESET) -DCAIRN_BUILD_BENCHMARKS=ON

@@ -62,6 +62,27 @@ TEST(MapSeal, WholeMapIsVerified) {
   EXPECT_FALSE(ReadSeal(path)->is_signed());
 }
 
+TEST(MapSeal, StandsWholeAndOnceInTheSecondPage) {
+  const std::string path = WriteExample("seal_place.cairn");
+  const std::string bytes = *ReadFile(path), magic = "cairn map seal 2";
+  // [SQLite file format, 1.3.2]: the page's size is at 16, big-endian.
+  const size_t page_size = 256 * static_cast<uint8_t>(bytes[16]) + static_cast<uint8_t>(bytes[17]);
+  const size_t seal = bytes.find(magic);
+  ASSERT_EQ(seal + Seal::kNumBytes, 2 * page_size);  // a row stands at the end of its page
+  const auto error_with = [&](size_t place, bool has_other) {
+    std::string changed = bytes;
+    if (!has_other) changed.replace(seal, magic.size(), magic.size(), '-');
+    changed.replace(place, magic.size(), magic);
+    EXPECT_TRUE(WriteFileAtomically(path, changed).ok());
+    const Result<Seal> read = ReadSeal(path);
+    return read.ok() ? std::string() : read.error().message;
+  };
+  EXPECT_EQ(error_with(seal - 1, false), "");  // whole, if of other values
+  for (const size_t place : {seal + 1, 2 * page_size - magic.size(), 2 * page_size, page_size - magic.size()})
+    EXPECT_THAT(error_with(place, false), HasSubstr("page 2 has no seal")) << place;
+  EXPECT_THAT(error_with(seal - magic.size(), true), HasSubstr("page 2 has no seal"));
+}
+
 TEST(MapSeal, EverySingleFlippedBitIsFound) {
   const std::string path = WriteExample("flip.cairn");
   const std::string bytes = *ReadFile(path);

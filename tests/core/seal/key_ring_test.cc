@@ -178,6 +178,14 @@ TEST(KeyRing, KeysThatAreNobodysAreRefused) {
   }
 }
 
+TEST(KeyRing, CommentsAreLinesOfTheFile) {
+  std::string text = Replaced(GoodText(), kBob, "01" + std::string(62, '0'));
+  text.insert(text.find('\n') + 1, "# of the office\n\n# and of the workshop\n");
+  const Result<KeyRing> ring = DecodeKeyRing(text, "it");
+  ASSERT_FALSE(ring.ok());
+  EXPECT_THAT(ring.error().message, HasSubstr("line 8: its key"));
+}
+
 TEST(KeyRing, SixtyFourKeysAreTheMost) {
   const auto text = [](int num_keys) {
     std::string all = fmt::format("cairn key ring 1\nversion 1\nthreshold {} of {}\n", num_keys, num_keys);
@@ -188,6 +196,17 @@ TEST(KeyRing, SixtyFourKeysAreTheMost) {
   EXPECT_LT(text(64).size(), KeyRing::kMaxNumBytes);
   EXPECT_EQ(DecodeKeyRing(text(64), "it").value().keys.size(), 64U);
   EXPECT_FALSE(DecodeKeyRing(text(65), "it").ok());
+}
+
+TEST(KeyRing, MayBeAsLargeAsItsBoundAndNotLarger) {
+  const std::string ring = GoodText();
+  const std::string comment = "#" + std::string(KeyRing::kMaxNumBytes - ring.size() - 2, '-') + "\n";
+  const std::string largest = ring + comment;
+  ASSERT_EQ(largest.size(), KeyRing::kMaxNumBytes);
+  EXPECT_TRUE(DecodeKeyRing(largest, "it").ok());
+  const Result<KeyRing> larger = DecodeKeyRing(largest + "#", "it");
+  ASSERT_FALSE(larger.ok());
+  EXPECT_THAT(larger.error().message, HasSubstr("is larger than 16384 bytes"));
 }
 
 TEST(KeyRing, RingsThatCannotBeMeantAreNotWrittenNorTrusted) {
