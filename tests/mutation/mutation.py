@@ -119,13 +119,13 @@ class Build:
             file = pathlib.Path(entry["file"])
             if "/Unity/" in entry["file"]:
                 for source in re.findall(r'^#include "(.*)"$', file.read_text(), re.MULTILINE):
-                    self.commands.setdefault(source, command)
+                    self.commands.setdefault(pathlib.Path(source).resolve(), command)
             else:
-                self.commands.setdefault(entry["file"], command)
+                self.commands.setdefault(file.resolve(), command)
 
     def compile(self, source, changed, to):
         """The command that compiles `changed` as if it were `source`."""
-        command = list(self.commands[str(source)])
+        command = list(self.commands[source.resolve()])
         command[command.index("-o") + 1] = str(to)
         command[command.index("-c") + 1] = str(changed)
         for option in ("-MT", "-MF"):
