@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <string>
 
-#include "core/atlas/atlas_file.h"
 #include "core/base/blob.h"
 #include "core/base/progress.h"
 #include "core/delta/map_delta.h"
@@ -11,9 +10,8 @@
 #include "core/files/file.h"
 #include "core/map/map_file.h"
 #include "core/plan/views_database.h"
-#include "core/seal/key_ring.h"
-#include "core/seal/signing_key.h"
 #include "stages/emit_map/emit_map.h"
+#include "tests/core/atlas/two_floors.h"
 #include "tests/core/map/example.h"
 
 namespace {
@@ -46,23 +44,7 @@ bool WritePacked(MapRows rows, const std::string& folder) {
   return WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok();
 }
 
-AtlasRows ExampleAtlas() {
-  AtlasRows atlas;
-  atlas.name = "campus";
-  atlas.epoch = 7;
-  atlas.maps.push_back({.name = "floor 1",
-                        .file = "floor1.cairn",
-                        .fingerprint = {1, 2, 3},
-                        .num_bytes = 100'000,
-                        .num_images = 40,
-                        .places = {{0, 1, 0xffffffff}, {}, {5, 1u << 31}}});
-  atlas.maps.push_back({.name = "floor 2", .file = "../floor2.cairn", .num_images = 9, .places = {{77}}});
-  atlas.look_alikes = {{{0, 39}, {1, 8}}};
-  atlas.passages = {{.name = "lift", .from = {0, 3}, .to = {1, 0}, .cost = 12.5}};
-  return atlas;
-}
-
-// What the stages leave for each other, and a delta, an atlas and keys, each behind the name of its reader.
+// What the stages leave for each other, and a delta, an atlas and a map, each behind the name of its reader.
 // The text files of tests/fuzz/readers are written by hand.
 bool WriteReaders(const EmitExample& example, const MapRows& rows, const std::string& folder) {
   const std::string path = folder + "/written";
@@ -80,7 +62,7 @@ bool WriteReaders(const EmitExample& example, const MapRows& rows, const std::st
       keep("vocabulary", "vocabulary", WriteVocabulary(example.vocabulary, path)) &&
       keep("views", "views",
            WriteViews(MakeExampleViews(), path, progress, [](SQLite::Database&) { return Ok(); }));
-  AtlasRows atlas = ExampleAtlas();
+  AtlasRows atlas = TwoFloors();
   const auto bytes = EncodeAtlas(std::nullopt, &atlas);
   is_whole &= bytes.ok() && keep("atlas", "atlas", WriteFileAtomically(path, *bytes));
   MapRows after = rows;

@@ -13,7 +13,7 @@ namespace {
 constexpr double kNoiseRad = 0.0005, kViewRad = 0.6, kViewM = 6;
 
 // A camera that drives ahead through a cloud of points, and pairs of what near images share.
-struct RingDrive {
+struct CloudDrive {
   std::vector<Pose> cams_from_world;
   std::vector<std::vector<Eigen::Vector3d>> bearings;  // per image and point; zero: not seen
   std::vector<ViewPair> pairs;
@@ -27,7 +27,7 @@ struct RingDrive {
   Eigen::Vector3d Center(int image) const { return cams_from_world[image].Center(); }
 };
 
-void AddPairs(int max_distance, RingDrive* drive) {
+void AddPairs(int max_distance, CloudDrive* drive) {
   const int num_images = static_cast<int>(drive->cams_from_world.size());
   for (int i = 0; i < num_images; ++i) {
     for (int k = i + 1; k < num_images && k <= i + max_distance; ++k) {
@@ -53,12 +53,12 @@ void AddPairs(int max_distance, RingDrive* drive) {
 
 // Twelve steps of 0.1 m along x, a turn of 45 degrees on the spot in five images, twelve steps of 0.3 m
 // ahead: only what is seen from before and behind the turn tells that these are longer.
-RingDrive MakeRingDrive() {
+CloudDrive DriveThroughCloud() {
   Random random(2);
   std::vector<Eigen::Vector3d> points;
   for (int p = 0; p < 4000; ++p)
     points.emplace_back(random.Uniform(-5, 9), random.Uniform(-5, 9), random.Uniform(-1.5, 1.5));
-  RingDrive drive;
+  CloudDrive drive;
   Eigen::Vector3d center(0, 0, 0);
   double heading = 0;
   const auto add = [&] {
@@ -86,14 +86,14 @@ RingDrive MakeRingDrive() {
   return drive;
 }
 
-BearingOf BearingsOf(const RingDrive& drive) {
+BearingOf BearingsOf(const CloudDrive& drive) {
   return [&drive](int image, KeypointIdx keypoint) -> std::optional<Eigen::Vector3d> {
     if (drive.bearings[image][keypoint].isZero()) return std::nullopt;
     return drive.bearings[image][keypoint];
   };
 }
 
-std::vector<Way> Find(const RingDrive& drive, const std::vector<ImageMotion>& motions = {},
+std::vector<Way> Find(const CloudDrive& drive, const std::vector<ImageMotion>& motions = {},
                       int num_threads = 2, bool weigh_by_matches = false) {
   return WaysBy(drive.Rotations(), drive.pairs, motions, drive.steps, BearingsOf(drive), kNoiseRad,
                 weigh_by_matches, num_threads);
@@ -175,7 +175,7 @@ TEST(PairLengths, APairThatSharesTooLittleHasNone) {
 }
 
 TEST(ImageWays, TellHowMuchLongerStepsAreBehindATurnOnTheSpot) {
-  const RingDrive drive = MakeRingDrive();
+  const CloudDrive drive = DriveThroughCloud();
   const std::vector<Way> found = Find(drive);
   const std::vector<Eigen::Vector3d> centers = CentersAlong(30, found);
   const double scale = LengthOf(centers, 0, 12) / 1.2;
@@ -185,7 +185,7 @@ TEST(ImageWays, TellHowMuchLongerStepsAreBehindATurnOnTheSpot) {
 }
 
 TEST(ImageWays, WeighAsMuchAsMatchesIfAsked) {
-  const RingDrive drive = MakeRingDrive();
+  const CloudDrive drive = DriveThroughCloud();
   const std::vector<Way> plain = Find(drive), weighed = Find(drive, {}, 2, true);
   ASSERT_EQ(plain.size(), weighed.size());
   for (size_t w = 0; w < drive.pairs.size(); ++w) {
@@ -198,7 +198,7 @@ TEST(ImageWays, WeighAsMuchAsMatchesIfAsked) {
 }
 
 TEST(ImageWays, MotionsGiveTheUnitAlsoWhereTheyAreMissing) {
-  const RingDrive drive = MakeRingDrive();
+  const CloudDrive drive = DriveThroughCloud();
   std::vector<ImageMotion> motions;
   for (int i = 1; i < 8; ++i)
     motions.push_back({i - 1, i, drive.cams_from_world[i] * drive.cams_from_world[i - 1].Inverse()});
@@ -210,7 +210,7 @@ TEST(ImageWays, MotionsGiveTheUnitAlsoWhereTheyAreMissing) {
 
 // A motion is known of a pair whichever of its images comes first, and of two that no pair joins.
 TEST(ImageWays, MotionsJoinWhatNoPairDoes) {
-  RingDrive drive = MakeRingDrive();
+  CloudDrive drive = DriveThroughCloud();
   std::erase_if(drive.pairs, [](const ViewPair& pair) { return pair.image1 < 20 && pair.image2 >= 20; });
   std::vector<ImageMotion> motions = {
       {19, 20, drive.cams_from_world[20] * drive.cams_from_world[19].Inverse()},
@@ -221,7 +221,7 @@ TEST(ImageWays, MotionsJoinWhatNoPairDoes) {
 }
 
 TEST(ImageWays, APairThatIsWrongHasLittleSay) {
-  RingDrive drive = MakeRingDrive();
+  CloudDrive drive = DriveThroughCloud();
   for (ViewPair& pair : drive.pairs) {
     if (pair.image1 == 5 && pair.image2 == 9) pair.cam2_from_cam1.translation = Eigen::Vector3d::UnitX();
   }
@@ -231,7 +231,7 @@ TEST(ImageWays, APairThatIsWrongHasLittleSay) {
 }
 
 TEST(ImageWays, SameForAnyNumberOfThreads) {
-  const RingDrive drive = MakeRingDrive();
+  const CloudDrive drive = DriveThroughCloud();
   const std::vector<Way> one = Find(drive, {}, 1), seven = Find(drive, {}, 7);
   ASSERT_EQ(one.size(), seven.size());
   for (size_t k = 0; k < one.size(); ++k) EXPECT_EQ(one[k].way, seven[k].way);
