@@ -2,7 +2,7 @@
 # Makes releases, compares and verifies them, lets lintian judge the Debian packages, installs them in a fresh system, upgrades, uses and
 # removes them:
 #   check_packages.sh SOURCES FOLDER POSTER
-# MIRROR=http://... names another mirror than Debian's own.
+# MIRROR=http://... names another mirror than Debian's own.  Where it is out of reach, the part in a fresh system is skipped.
 set -euo pipefail
 sources=$1 folder=$2 poster=$3
 if [ "$(id -u)" != 0 ]; then
@@ -102,10 +102,17 @@ for program in "$folder/where_c" "$folder/robot/where_c" "$folder/robot/where_cc
     { echo "$program gives no fix" >&2; exit 1; }
 done
 
+mirror=${MIRROR:-http://deb.debian.org/debian}
+wget -q --tries=2 --timeout=30 -O /dev/null "$mirror/dists/bookworm/Release" || {
+  reached=$?
+  ((reached == 4)) || fail "$mirror: no mirror of bookworm (wget: $reached)"
+  echo "skipped, after the packages were made, compared and judged: $mirror is not in reach (network, proxy, or set MIRROR); a fresh system needs it"
+  exit 77
+}
 system=$(mktemp -d)
 trap 'gpgconf --kill all; rm -rf "$GNUPGHOME"; rm -rf --one-file-system "$system"' EXIT
-debootstrap --variant=minbase bookworm "$system" "${MIRROR:-http://deb.debian.org/debian}" > "$folder/debootstrap.log" 2>&1 ||
-  { tail -5 "$folder/debootstrap.log" >&2; echo "debootstrap failed; is the mirror in reach?" >&2; exit 1; }
+debootstrap --variant=minbase bookworm "$system" "$mirror" > "$folder/debootstrap.log" 2>&1 ||
+  { tail -5 "$folder/debootstrap.log" >&2; echo "debootstrap failed" >&2; exit 1; }
 inside() { chroot "$system" "$@"; }
 
 # Nothing of this outlives the test: no need to wait for the disk.
