@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <set>
 #include <string_view>
@@ -326,10 +325,6 @@ Status AddAtlasSignature(const std::string& path, const SecretKey& key, const st
 
 std::string SignedBytesOf(const AtlasRows& atlas) { return SignedHead(atlas.public_key, atlas.payload_hash); }
 
-bool IsAtlasFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string magic(kMagic.size(), '\0');
-  return file.read(magic.data(), static_cast<std::streamsize>(magic.size())) && magic == kMagic;
-}
+bool IsAtlasFile(const std::string& path) { return ReadHead(path, kMagic.size()) == kMagic; }
 
 }  // namespace cairn

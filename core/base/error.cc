@@ -50,6 +50,8 @@ const char* ErrorCodeName(ErrorCode code) {
       return "not_newer";
     case ErrorCode::kOtherMap:
       return "other_map";
+    case ErrorCode::kNoMemory:
+      return "no_memory";
   }
   return "failed";
 }

@@ -37,6 +37,7 @@ enum class ErrorCode : int {
   // Signed maps that are right in themselves, but not what this robot may take.
   kNotNewer = 22,  // its epoch is not later than that of the map in place, or below the requested minimum
   kOtherMap = 23,  // it has another name: the map of another site
+  kNoMemory = 24,  // none is left, or less than the work takes
 };
 
 // Stable lower-case name of a code, as it stands in error.json ("corrupt", "no_data", ...).

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
-#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -29,7 +28,10 @@ void ParallelFor(int64_t num_items, int num_threads, const std::function<void(in
   std::atomic<int64_t> next{0};
   std::exception_ptr first_exception;
   std::mutex exception_mutex;
+  // Threads take memory, their stacks, before any work does: who gets it must not depend on time.
+  std::atomic<bool> all_begun{false};
   auto work = [&] {
+    all_begun.wait(false);
     for (int64_t i; (i = next.fetch_add(1)) < num_items;) {
       try {
         body(i);
@@ -44,8 +46,10 @@ void ParallelFor(int64_t num_items, int num_threads, const std::function<void(in
   workers.reserve(num_workers - 1);
   try {
     for (int64_t w = 1; w < num_workers; ++w) workers.emplace_back(work);
-  } catch (const std::system_error&) {  // no memory or no room for more threads: fewer do as well
+  } catch (const std::exception&) {  // no memory or no room for more threads: fewer do as well
   }
+  all_begun = true;
+  all_begun.notify_all();
   work();
   for (std::thread& worker : workers) worker.join();
   if (first_exception) std::rethrow_exception(first_exception);

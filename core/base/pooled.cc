@@ -6,6 +6,8 @@
 #include <new>
 #include <utility>
 
+#include "core/threads/of_thread.h"
+
 namespace cairn {
 namespace {
 
@@ -96,17 +98,7 @@ class Pool {
   size_t num_bytes_ = 0;
 };
 
-// Null while a thread ends, when there may be objects that outlive its pool.
-thread_local bool is_gone = false;
-
-Pool* PoolOfThread() {
-  if (is_gone) return nullptr;
-  thread_local Pool pool;
-  return &pool;
-}
-
 Pool::~Pool() {
-  is_gone = true;
   for (Block* first : blocks_) {
     while (first != nullptr) operator delete(std::exchange(first, first->next), kAlignment);
   }
@@ -120,7 +112,7 @@ void* TakePooled(size_t num_bytes) {
   if (kKeeps && num_bytes <= kLargestBytes) {
     size = SizeFor(num_bytes);
     num_bytes = BytesOf(size);
-    if (Pool* const pool = PoolOfThread()) block = pool->Take(size);
+    if (Pool* const pool = OfThread<Pool>()) block = pool->Take(size);
   }
   if (block == nullptr) block = new (operator new(sizeof(Block) + num_bytes, kAlignment)) Block{.size = size};
   return block + 1;
@@ -129,7 +121,7 @@ void* TakePooled(size_t num_bytes) {
 void GivePooled(void* memory) noexcept {
   Block* const block = static_cast<Block*>(memory) - 1;
   if (block->size < kNumSizes) {
-    if (Pool* const pool = PoolOfThread(); pool != nullptr && pool->Keep(block)) return;
+    if (Pool* const pool = OfThread<Pool>(); pool != nullptr && pool->Keep(block)) return;
   }
   operator delete(block, kAlignment);
 }

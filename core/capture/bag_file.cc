@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <string_view>
 
 #include "core/base/text.h"
 #include "core/files/database.h"
+#include "core/files/file.h"
 #include "core/files/input_file.h"
 
 namespace cairn {
@@ -43,11 +43,7 @@ bool HasBagTables(const std::string& path) {
 }  // namespace
 
 BagStorage BagStorageOf(const std::string& path) {
-  if (!CheckInputFile(path).ok()) return BagStorage::kNone;
-  std::string head(16, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(file.gcount()));
+  const std::string head = ReadHead(path, 16);
   for (const BagKind& kind : kBagKinds) {
     if (head.starts_with(kind.first_bytes)) return kind.storage;
   }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <string_view>
 
+#include "core/files/file.h"
 #include "core/files/input_file.h"
 
 namespace cairn {
@@ -15,19 +15,10 @@ constexpr const char* kFilmSuffixes[] = {".mp4", ".m4v", ".mov", ".mkv", ".webm"
                                          ".3gp", ".ts",  ".mts", ".mpg", ".mpeg"};
 constexpr std::string_view kBoxes[] = {"ftyp", "moov", "mdat", "wide", "skip", "free"};
 
-// Fewer where the file has fewer.
-std::string FirstBytes(const std::string& path, size_t num_bytes) {
-  std::string bytes(num_bytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(bytes.data(), static_cast<std::streamsize>(num_bytes));
-  bytes.resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return bytes;
-}
-
 }  // namespace
 
 bool BeginsLikeMp4(const std::string& path) {
-  const std::string bytes = FirstBytes(path, 8);
+  const std::string bytes = ReadHead(path, 8);
   return bytes.size() == 8 &&
          std::find(std::begin(kBoxes), std::end(kBoxes), bytes.substr(4)) != std::end(kBoxes);
 }
@@ -39,7 +30,7 @@ bool IsFilm(const std::string& path) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (std::find(std::begin(kFilmSuffixes), std::end(kFilmSuffixes), suffix) != std::end(kFilmSuffixes))
     return true;
-  const std::string bytes = FirstBytes(path, 12);
+  const std::string bytes = ReadHead(path, 12);
   const bool is_avi = bytes.starts_with("RIFF") && bytes.ends_with("AVI ");
   return is_avi || bytes.starts_with("\x1a\x45\xdf\xa3") || BeginsLikeMp4(path);  // Matroska's mark
 }

@@ -4,11 +4,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include <SQLiteCpp/Backup.h>
 
 #include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
 #include "core/files/file_lock.h"
 
 namespace cairn {
@@ -70,9 +70,9 @@ Status CheckSchema(SQLite::Database& database, const std::string& path) {
 }
 
 bool IsInWalMode(const std::string& path) {
-  char head[20] = {};  // bytes 18 and 19: file format write and read version, 2 = write-ahead log
-  std::ifstream file(path, std::ios::binary);
-  return file.read(head, sizeof(head)) && head[18] == 2 && head[19] == 2;
+  const std::string head =
+      ReadHead(path, 20);  // bytes 18 and 19: write and read version, 2 = write-ahead log
+  return head.size() == 20 && head[18] == 2 && head[19] == 2;
 }
 
 // 0 where there is none.

@@ -7,6 +7,7 @@
 #include "core/base/pooled.h"
 #include "core/features/best_two_kernel.h"
 #include "core/features/descriptor_distance.h"
+#include "core/threads/of_thread.h"
 
 namespace cairn {
 namespace {
@@ -150,7 +151,7 @@ void SweepBlocks(const DescriptorBlock& block1, const DescriptorBlock& block2, c
 
 void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
                  PooledVector<BestTwo>* rows, PooledVector<BestTwo>* columns) {
-  thread_local Scratch scratch;
+  Scratch& scratch = RequiredOfThread<Scratch>();
   rows->assign(descriptors1.size(), {});
   columns->assign(descriptors2.size(), {});
   const BestTwoKernel& kernel = KernelForAll(descriptors1.kernel());

@@ -6,8 +6,8 @@
 #include <cerrno>
 #include <climits>
 #include <filesystem>
-#include <fstream>
 
+#include "core/files/file.h"
 #include "core/files/file_descriptor.h"
 #include "core/files/input_file.h"
 
@@ -50,13 +50,7 @@ SqliteHeader ParseSqliteHeader(std::string_view head) {
   return header;
 }
 
-SqliteHeader ReadSqliteHeader(const std::string& path) {
-  char head[32] = {};
-  if (!CheckInputFile(path).ok()) return {};
-  std::ifstream file(path, std::ios::binary);
-  file.read(head, sizeof(head));
-  return ParseSqliteHeader({head, static_cast<size_t>(file.gcount())});
-}
+SqliteHeader ReadSqliteHeader(const std::string& path) { return ParseSqliteHeader(ReadHead(path, 32)); }
 
 std::string DatabaseUri(const std::string& path) {
   std::string uri = path.starts_with("//") ? "file://" : "file:";  // what follows two slashes is a host
@@ -117,10 +111,7 @@ SQLite::Database OpenPrivate(const std::string& path) {
 }
 
 bool IsSqliteFile(const std::string& path) {
-  char head[sizeof(kMagic)] = {};
-  if (!CheckInputFile(path).ok()) return false;
-  std::ifstream file(path, std::ios::binary);
-  return file.read(head, sizeof(head)) && std::memcmp(head, kMagic, sizeof(kMagic)) == 0;
+  return ReadHead(path, sizeof(kMagic)) == std::string_view(kMagic, sizeof(kMagic));
 }
 
 Status CheckSqliteFile(const std::string& path) {

@@ -26,6 +26,7 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
     const ErrorCode error =
         code == SQLITE_BUSY || code == SQLITE_LOCKED ? ErrorCode::kBusy
         : code == SQLITE_FULL                        ? ErrorCode::kDiskFull
+        : code == SQLITE_NOMEM                       ? ErrorCode::kNoMemory
         : code == SQLITE_IOERR || code == SQLITE_READONLY || code == SQLITE_CANTOPEN || code == SQLITE_PERM
             ? ErrorCode::kIo
             : ErrorCode::kCorrupt;

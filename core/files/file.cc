@@ -77,6 +77,20 @@ Result<std::string> ReadFile(const std::string& path) {
   return contents;
 }
 
+std::string ReadHead(const std::string& path, size_t num_bytes) {
+  Result<InputFile> file = InputFile::Open(path);
+  if (!file.ok()) return "";
+  std::string head(num_bytes, '\0');
+  size_t num_read = 0;
+  while (num_read < num_bytes) {
+    const Result<size_t> more = file->Read(std::span(head).subspan(num_read));
+    if (!more.ok() || *more == 0) break;
+    num_read += *more;
+  }
+  head.resize(num_read);
+  return head;
+}
+
 Status ReplaceFileAtomically(const std::string& path,
                              const std::function<Status(const std::string&)>& write) {
   CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));

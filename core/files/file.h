@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -11,6 +12,8 @@ namespace cairn {
 
 // Errors: NotFound, Io (also when only a part of it can be read).
 Result<std::string> ReadFile(const std::string& path);
+// The first bytes, to tell what it is: fewer where it has fewer, none where it cannot be read.
+std::string ReadHead(const std::string& path, size_t num_bytes);
 
 // Writes through a temporary file in the target's folder (core/files/replacement.h): a reader sees the old
 // file or the whole new one.  A target that has the same bytes already is left untouched, its date included.

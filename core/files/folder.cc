@@ -76,17 +76,11 @@ Status PutInPlace(const std::string& temporary, const std::string& path) {
 // Removes what killed processes left beside `path`.  A process that died between two renames left the old
 // folder aside: it is moved back.
 void RemoveLeftovers(const std::string& path, const std::string& kind) {
-  const fs::path target(path);
-  std::vector<std::string> leftovers;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(path), error)) {
-    const std::string name = entry.path().filename().string();
-    if (!IsTemporaryName(name, target.filename().string())) continue;
-    const auto process = static_cast<pid_t>(std::strtol(name.c_str() + name.rfind(".tmp-") + 5, nullptr, 10));
-    if (process > 0 && kill(process, 0) != 0 && errno == ESRCH) leftovers.push_back(entry.path().string());
-  }
-  std::sort(leftovers.begin(), leftovers.end());
-  for (const std::string& leftover : leftovers) {
+  for (const std::string& leftover : TemporariesOf(path)) {
+    const auto process =
+        static_cast<pid_t>(std::strtol(leftover.c_str() + leftover.rfind(".tmp-") + 5, nullptr, 10));
+    if (process <= 0 || kill(process, 0) == 0 || errno != ESRCH) continue;
+    std::error_code error;
     if (leftover.ends_with(kAside) && !Exists(path) && CheckOwnFolder(leftover, kind).ok())
       fs::rename(leftover, path, error);
     else

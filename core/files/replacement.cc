@@ -1,10 +1,11 @@
 #include "core/files/replacement.h"
 
 #include <fcntl.h>
-#include <stdio.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <climits>
+#include <cstdio>
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -83,9 +84,8 @@ Result<Replacement> Replacement::Begin(const std::string& path, mode_t new_mode)
   } else if (errno != ENOENT) {
     return WriteError(path, "cannot be replaced", errno);
   }
-  CAIRN_ASSIGN_OR_RETURN(const TemporaryFile temporary,
-                         CreateTemporary(path, file.replaced_ ? 0600 : new_mode));
-  file.temporary_ = temporary.path;
+  CAIRN_ASSIGN_OR_RETURN(TemporaryFile temporary, CreateTemporary(path, file.replaced_ ? 0600 : new_mode));
+  file.temporary_ = std::move(temporary.path);
   file.file_ = temporary.descriptor;
   return file;
 }
@@ -102,7 +102,11 @@ Replacement::~Replacement() {
   if (file_ >= 0) close(file_);
   if (folder_ >= 0) close(folder_);
   if (temporary_.empty()) return;
-  for (const char* suffix : {"", "-journal", "-wal", "-shm"}) unlink((temporary_ + suffix).c_str());
+  for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+    char path[PATH_MAX];  // there may be no memory for a string
+    const int length = std::snprintf(path, sizeof(path), "%s%s", temporary_.c_str(), suffix);
+    if (length > 0 && length < static_cast<int>(sizeof(path))) unlink(path);
+  }
 }
 
 Status Replacement::Write(std::string_view bytes) {

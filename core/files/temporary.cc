@@ -1,5 +1,6 @@
 #include "core/files/temporary.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <sys/random.h>
 #include <unistd.h>
@@ -7,10 +8,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <string_view>
 
 #include <fmt/format.h>
 
+#include "core/files/output_path.h"
 #include "core/files/write_error.h"
 
 namespace cairn {
@@ -42,6 +46,19 @@ bool IsTemporaryName(const std::string& name, const std::string& target) {
   const size_t end = std::min(name.find_first_not_of("0123456789", digits), name.size());
   return end > digits && (end == name.size() || name[end] == '-' ||
                           name.compare(end, kTemporaryMark.size(), kTemporaryMark) == 0);
+}
+
+std::vector<std::string> TemporariesOf(const std::string& target) {
+  const std::filesystem::path path(target);
+  const std::string name = path.filename().string();
+  const std::unique_ptr<DIR, int (*)(DIR*)> folder(opendir(FolderOf(target).c_str()), &closedir);
+  std::vector<std::string> temporaries;
+  if (folder == nullptr) return temporaries;
+  while (const dirent* const entry = readdir(folder.get())) {
+    if (IsTemporaryName(entry->d_name, name)) temporaries.push_back(path.parent_path() / entry->d_name);
+  }
+  std::sort(temporaries.begin(), temporaries.end());
+  return temporaries;
 }
 
 Result<TemporaryFile> CreateTemporary(const std::string& target, mode_t mode) {

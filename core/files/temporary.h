@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/files/file_descriptor.h"
@@ -20,6 +21,10 @@ std::string RandomTemporaryPath(const std::string& target);
 // Whether a name is that of such a temporary of `target` (a name; "" = of anything), or of what SQLite, a
 // replaced folder or a temporary's own temporary leaves beside one: TARGET.tmp-PROCESS-journal, -old.
 bool IsTemporaryName(const std::string& name, const std::string& target);
+
+// The paths of such temporaries beside `target`, sorted; none where its folder cannot be listed. (libstdc++'s
+// directory_iterator ends the program where there is no memory.)
+std::vector<std::string> TemporariesOf(const std::string& target);
 
 // A file that this process has just created, empty and open for reading and writing.
 struct TemporaryFile {

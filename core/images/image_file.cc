@@ -85,17 +85,26 @@ std::string FindDefect(std::string_view bytes) {
   return "";
 }
 
+Result<const ImageModule*> LoadImageModule() {
+  CAIRN_ASSIGN_OR_RETURN(const void* const loaded,
+                         LoadModuleOfProgram("images", {.symbol = kImageModuleName,
+                                                        .version = CAIRN_MODULE_VERSION,
+                                                        .needs = "OpenCV's codecs",
+                                                        .packages = CAIRN_CODECS_PACKAGE}));
+  const auto* const module = static_cast<const ImageModule*>(loaded);
+  // OpenCV makes its codecs for the first image, GDAL's too, which ends the program where there is no memory:
+  // now, while other threads wait for this, rather than at any time.
+  std::string image = "P5 1 1 255 \n";
+  module->decode_grey(cv::Mat(1, static_cast<int>(image.size()), CV_8UC1, image.data()));
+  return module;
+}
+
 // `path`: what it is for.
 Result<const ImageModule*> ModuleFor(const std::string& path) {
-  static const Result<const void*> module = LoadModuleOfProgram("images", {.symbol = kImageModuleName,
-                                                                           .version = CAIRN_MODULE_VERSION,
-                                                                           .needs = "OpenCV's codecs",
-                                                                           .packages = CAIRN_CODECS_PACKAGE});
-  if (!module.ok()) {
-    return MakeError(module.error().code, "{}: image files cannot be read and written here: {}", path,
-                     module.error().message);
-  }
-  return static_cast<const ImageModule*>(*module);
+  static const Result<const ImageModule*> module = LoadImageModule();
+  if (module.ok()) return module;
+  return MakeError(module.error().code, "{}: image files cannot be read and written here: {}", path,
+                   module.error().message);
 }
 
 // Adds the ids of the libraries that decide what a decoded image is.

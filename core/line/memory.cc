@@ -68,7 +68,7 @@ Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mi
   const int64_t needed_mib = (num_bytes + kProgramBytes + (int64_t{1} << 20) - 1) >> 20;
   if (needed_mib <= memory_mib) return Ok();
   return MakeError(
-      ErrorCode::kFailed,
+      ErrorCode::kNoMemory,
       "{} takes about {} MiB of memory, but --memory allows {} MiB; allow more, or use a larger machine",
       work, needed_mib, memory_mib);
 }

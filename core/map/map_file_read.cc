@@ -178,9 +178,11 @@ Result<MapRows> ReadMapRows(const MapFile& file) {
   MapRows rows;
   const Status status = RowsReader(file, &rows).Read();
   if (status.ok()) return rows;
-  // CheckMapRows does not know the file's name.
+  // CheckMapRows does not know of the file.
   const bool names_file = status.error().message.find(file.path()) != std::string::npos;
-  return MakeError(ErrorCode::kCorrupt, "{}{}", names_file ? "" : file.path() + ": ", status.error().message);
+  const ErrorCode code = status.error().code;
+  return MakeError(code == ErrorCode::kInvalidArgument ? ErrorCode::kCorrupt : code, "{}{}",
+                   names_file ? "" : file.path() + ": ", status.error().message);
 }
 
 }  // namespace cairn

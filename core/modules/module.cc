@@ -3,6 +3,8 @@
 #include <dlfcn.h>
 #include <sys/resource.h>
 
+#include <atomic>
+#include <mutex>
 #include <new>
 #include <string_view>
 
@@ -25,19 +27,29 @@ bool IsMemoryLimited() {
 // A segment that cannot be mapped may also be one that the file system does not let run.
 bool IsOfMemory(const std::string& text) {
   return text.find("annot allocate memory") != std::string::npos ||
+         text.find("cannot map zero-fill pages") != std::string::npos ||
          (text.find("failed to map segment") != std::string::npos && IsMemoryLimited());
 }
 
-// What constructors of a module's libraries take (GDCM's tables, some 10 MiB): none of them can say that
-// there is no memory, which ends the program.
+// What constructors of a module's libraries take (GDCM's tables, some 10 MiB).  Other threads may take it in
+// the meantime.
 constexpr size_t kConstructorsBytes = size_t{24} << 20;
+
+std::mutex loading;
+std::atomic<bool> loader_is_held = false;
 
 }  // namespace
 
+bool LoaderIsHeld() { return loader_is_held; }
+
 Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted) {
+  const std::lock_guard<std::mutex> lock(loading);
+  if (loader_is_held) throw std::bad_alloc();             // dlopen would wait for ever
   ::operator delete(::operator new(kConstructorsBytes));  // throws where there is not so much
+  loader_is_held = true;  // stays so where a constructor throws, through dlopen
   // Never closed: what it made, and what its libraries registered, live on.
   void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  loader_is_held = false;
   if (library == nullptr) {
     const std::string text = dlerror();
     if (IsOfMemory(text)) throw std::bad_alloc();

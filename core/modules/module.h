@@ -22,6 +22,11 @@ struct ModuleWanted {
 // Unsupported (no module, or one of another build).  Throws std::bad_alloc where memory is too short for it.
 Result<const void*> LoadModule(const std::string& path, const ModuleWanted& wanted);
 
+// Whether a constructor of a module's library has thrown std::bad_alloc through LoadModule.  The thread that
+// loaded it holds the lock of the C library's loader then, though it has ended: the process has to end by
+// std::_Exit, since std::exit would wait for that lock.
+bool LoaderIsHeld();
+
 // The same, of lib/cairn/NAME.so of this program.  Errors: also NotFound (no such file), Failed.
 Result<const void*> LoadModuleOfProgram(const std::string& name, const ModuleWanted& wanted);
 

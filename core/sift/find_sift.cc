@@ -9,6 +9,7 @@
 #include "core/sift/gaussian.h"
 #include "core/sift/octave.h"
 #include "core/sift/sift_memory.h"
+#include "core/threads/of_thread.h"
 
 namespace cairn {
 namespace {
@@ -269,7 +270,7 @@ PooledVector<SiftFeature> DescribeAll(std::span<const Octave> octaves, std::span
 
 PooledVector<SiftFeature> FindSift(const cv::Mat& grey, const cv::Mat& mask, const SiftSearch& search,
                                    const SiftKernels& kernels) {
-  thread_local SiftMemory memory;
+  SiftMemory& memory = RequiredOfThread<SiftMemory>();
   const cv::Rect region = search.region & cv::Rect({0, 0}, grey.size());
   if (region.empty() && !search.region.empty()) return {};
   const PooledVector<OctavePlan> plans = PlanOctaves(grey.size(), region, search);

@@ -81,7 +81,7 @@ std::string ProgramPage(const CLI::App& program, const std::string& version) {
     page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", Escaped(command.words),
                         Escaped(command.arguments->get_description()));
   page += ".SH EXIT STATUS\n.TP\n0\ndone\n";
-  for (int code = static_cast<int>(ErrorCode::kFailed); code <= static_cast<int>(ErrorCode::kOtherMap);
+  for (int code = static_cast<int>(ErrorCode::kFailed); code <= static_cast<int>(ErrorCode::kNoMemory);
        ++code)
     page += fmt::format(".TP\n{}\n{}\n", code, Escaped(ErrorCodeName(static_cast<ErrorCode>(code))));
   return page;

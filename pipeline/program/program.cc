@@ -7,18 +7,16 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <new>
 #include <optional>
 #include <sstream>
-#include <system_error>
 #include <utility>
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
 
+#include "core/base/no_throw.h"
 #include "core/base/parallel.h"
 #include "core/base/printable.h"
 #include "core/files/file.h"
@@ -74,26 +72,17 @@ void ConfigureLog(const std::string& level, ProgressStyle style) {
 
 Error OutOfMemory(const CommandEnvironment& environment) {
   return MakeError(
-      ErrorCode::kFailed,
+      ErrorCode::kNoMemory,
       "out of memory, with --memory {} (MiB) and {} threads; give it more, or use fewer --threads",
       environment.memory_mib, NumThreads(environment.num_threads));
-}
-
-// Whether it reports a lack of memory, also for a new thread.
-bool IsOutOfMemory(const std::exception& exception) {
-  if (dynamic_cast<const std::bad_alloc*>(&exception) != nullptr) return true;
-  if (const auto* of_opencv = dynamic_cast<const cv::Exception*>(&exception))
-    return of_opencv->code == cv::Error::StsNoMem;
-  const auto* of_system = dynamic_cast<const std::system_error*>(&exception);
-  return of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again;
 }
 
 Status RunCaught(const Command& command, const CommandEnvironment& environment) {
   try {
     Status status = command.run(environment);
     if (!status.ok() && StopRequested()) return kStopped;
-    // SQLite calls it an error of the file that it was about to read or write.
-    if (!status.ok() && status.error().message.ends_with("SQLite says: out of memory"))
+    if (!status.ok() && status.error().code == ErrorCode::kNoMemory &&
+        status.error().message.ends_with("out of memory"))  // of a library, which does not know of --memory
       return OutOfMemory(environment);
     return status;
   } catch (const std::exception& exception) {

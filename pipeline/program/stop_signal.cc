@@ -6,7 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
-#include <system_error>
+#include <exception>
 #include <utility>
 
 namespace cairn::pipeline {
@@ -61,7 +61,7 @@ StopDeadline::StopDeadline(std::function<void()> end) : end_(std::move(end)) {
   pthread_sigmask(SIG_BLOCK, &all, &before);
   try {
     watcher_ = std::thread([this] { Watch(); });
-  } catch (const std::system_error&) {  // no room for a thread: then the command alone looks for requests
+  } catch (const std::exception&) {  // no room for a thread: then the command alone looks for requests
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }

@@ -23,6 +23,7 @@ namespace cairn {
 namespace {
 
 static_assert(CAIRN_OTHER_MAP == static_cast<int>(ErrorCode::kOtherMap));
+static_assert(CAIRN_NO_MEMORY == static_cast<int>(ErrorCode::kNoMemory));
 
 struct OpenLocalizer : OfOneThread {
   static constexpr const char* kName = "localizer";
@@ -69,7 +70,7 @@ const char* cairn_version(void) { return CAIRN_VERSION; }
 
 const char* cairn_error_name(int32_t code) {
   if (code == CAIRN_OK) return "ok";
-  return code < CAIRN_OK || code > CAIRN_OTHER_MAP ? "unknown" : ErrorCodeName(static_cast<ErrorCode>(code));
+  return code < CAIRN_OK || code > CAIRN_NO_MEMORY ? "unknown" : ErrorCodeName(static_cast<ErrorCode>(code));
 }
 
 const char* cairn_reason_name(int32_t reason) {
@@ -81,7 +82,7 @@ const char* cairn_scope_name(int32_t scope) {
                                                                 : ScopeName(static_cast<Scope>(scope));
 }
 
-const char* cairn_last_error(void) { return LastError().c_str(); }
+const char* cairn_last_error(void) { return LastError(); }
 
 int32_t cairn_map_update(const char* map_path, const char* delta_path, const cairn_map_options* options,
                          int32_t* was_updated) {

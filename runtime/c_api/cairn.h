@@ -58,7 +58,8 @@ enum {
   CAIRN_DISK_FULL = 20,
   CAIRN_LOST = 21,
   CAIRN_NOT_NEWER = 22, /* a signed map of an epoch not later than this robot's, or below the requested one */
-  CAIRN_OTHER_MAP = 23  /* a signed map of another name: the map of another site */
+  CAIRN_OTHER_MAP = 23, /* a signed map of another name: the map of another site */
+  CAIRN_NO_MEMORY = 24  /* none is left for what was asked */
 };
 
 /* Why an image has no fix: a result, not an error.  Append-only. */

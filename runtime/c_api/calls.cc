@@ -1,13 +1,35 @@
 #include "runtime/c_api/calls.h"
 
 #include "core/options/find_option.h"
+#include "core/threads/of_thread.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
 
-std::string& LastError() {
-  thread_local std::string message;
-  return message;
+namespace {
+
+struct Sentence {
+  std::string text;
+  bool is_lost = false;  // there was no memory for it
+};
+
+}  // namespace
+
+const char* LastError() noexcept {
+  const Sentence* const last = OfThread<Sentence>();
+  return last == nullptr || last->is_lost ? kOutOfMemory : last->text.c_str();
+}
+
+void SetLastError(const char* function, const char* message) noexcept {
+  Sentence* const last = OfThread<Sentence>();
+  if (last == nullptr) return;
+  last->is_lost = true;
+  try {
+    last->text = message;
+    if (!last->text.starts_with(function)) last->text.insert(0, std::string(function) + ": ");
+    last->is_lost = false;
+  } catch (const std::bad_alloc&) {  // is lost
+  }
 }
 
 Status SetOptionByName(const OptionTable& table, const char* name, const char* value, const char* help) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -21,17 +22,24 @@ namespace cairn {
 
 class Map;  // runtime/map/map.h
 
-// This thread's last sentence.
-std::string& LastError();
+inline constexpr char kOutOfMemory[] = "out of memory";
+
+// This thread's last sentence, of the function named; what it is where there was no memory for it.
+const char* LastError() noexcept;
+void SetLastError(const char* function, const char* message) noexcept;
 
 // Runs a function's body; its error becomes the code, its sentence this thread's last one.
 template <typename Body>
-int32_t Call(const char* function, Body&& body) {
-  const Status status = WithoutExceptions(function, [&]() -> Status { return body(); });
-  if (status.ok()) return CAIRN_OK;
-  const std::string& message = status.error().message;
-  LastError() = message.starts_with(function) ? message : std::string(function) + ": " + message;
-  return static_cast<int32_t>(status.error().code);
+int32_t Call(const char* function, Body&& body) noexcept {
+  try {
+    const Status status = WithoutExceptions(function, [&]() -> Status { return body(); });
+    if (status.ok()) return CAIRN_OK;
+    SetLastError(function, status.error().message.c_str());
+    return static_cast<int32_t>(status.error().code);
+  } catch (const std::bad_alloc&) {  // for the sentence
+    SetLastError(function, kOutOfMemory);
+    return CAIRN_NO_MEMORY;
+  }
 }
 
 template <typename... Args>

@@ -1,10 +1,8 @@
 #include "runtime/map/open_views.h"
 
-#include <array>
-#include <fstream>
-#include <string_view>
+#include <string>
 
-#include "core/files/input_file.h"
+#include "core/files/file.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
@@ -12,10 +10,8 @@ namespace {
 
 // By the application_id in SQLite's header.
 bool IsMap(const std::string& path) {
-  std::array<char, 72> head{};
-  if (!CheckInputFile(path).ok()) return false;  // reading it as views says why
-  std::ifstream file(path, std::ios::binary);
-  return file.read(head.data(), head.size()) && std::string_view(&head[68], 4) == "crmp";
+  const std::string head = ReadHead(path, 72);  // of what cannot be read, reading it as views says why
+  return head.size() == 72 && head.ends_with("crmp");
 }
 
 // By `of_map` from a map.

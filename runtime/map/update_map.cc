@@ -30,13 +30,10 @@ namespace fs = std::filesystem;
 
 // Removes what killed updates have left beside a map.  REQUIRES: LockFolderOf(map_path)
 void RemoveStale(const std::string& map_path) {
-  std::error_code error;
-  const fs::path map(map_path);
-  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(map_path), error)) {
-    const std::string name = entry.path().filename().string();
-    const std::string file = map.filename().string();
-    for (const std::string& target : {file, PreviousMapPath(file), SignaturesPath(file)}) {
-      if (IsTemporaryName(name, target)) fs::remove(entry.path(), error);
+  for (const std::string& target : {map_path, PreviousMapPath(map_path), SignaturesPath(map_path)}) {
+    for (const std::string& temporary : TemporariesOf(target)) {
+      std::error_code error;
+      fs::remove(temporary, error);
     }
   }
 }

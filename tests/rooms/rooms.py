@@ -15,7 +15,7 @@ import sys
 
 # What a room is for stands in its CMakeLists.txt.
 ORDER = """
-core/base core/files core/modules core/images core/options core/geometry core/picture core/sift core/features core/learned core/work core/camera core/vocabulary core/colmap core/feature_files core/structure
+core/threads core/base core/files core/modules core/images core/options core/geometry core/picture core/sift core/features core/learned core/work core/camera core/vocabulary core/colmap core/feature_files core/structure
 core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/delta core/atlas core/line core/view_regions
 runtime/map runtime/localize runtime/track runtime/scans runtime/laser runtime/beams runtime/belief runtime/paths runtime/looks runtime/visual_map runtime/drive runtime/atlas runtime/robot_log runtime/c_api runtime/c_api/plans
 sim/render sim/survey sim/robot sim/worlds

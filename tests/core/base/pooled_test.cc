@@ -17,10 +17,10 @@ namespace {
 
 constexpr size_t kMib = size_t{1} << 20;
 
-// An object of a thread that was made before its pool, and outlives it.
-struct Late {
+// An object of a thread that uses the pool while the thread ends.
+struct EndsLate {
   PooledVector<int> values;
-  ~Late() {
+  ~EndsLate() {
     values.assign(10000, 1);
     values = {};
     GivePooled(TakePooled(10000));
@@ -168,7 +168,7 @@ TEST(Pooled, AThreadThatEndsGivesAllBack) {
     return info.uordblks + info.hblkhd;
   };
   const auto work = [] {
-    thread_local Late late;
+    thread_local EndsLate late;
     late.values.assign(100, 3);
     EXPECT_EQ(late.values[99], 3);
     std::vector<void*> taken;

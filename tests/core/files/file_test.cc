@@ -38,6 +38,7 @@ TEST_F(File, IsReadAndHashedWholeWhateverItsSize) {
     ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
     EXPECT_EQ(ReadFile(path).value(), bytes) << num_bytes;
     EXPECT_EQ(HashFile(path).value(), HashBytes(bytes)) << num_bytes;
+    EXPECT_EQ(ReadHead(path, 240), bytes.substr(0, 240)) << num_bytes;
   }
 }
 
@@ -61,6 +62,8 @@ TEST_F(File, ThatIsNoneIsAnError) {
   EXPECT_EQ(folder.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(folder.error().message, HasSubstr(folder_.string()));
   EXPECT_EQ(HashFile((folder_ / "missing").string()).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(ReadHead(folder_.string(), 4), "");
+  EXPECT_EQ(ReadHead((folder_ / "missing").string(), 4), "");
 }
 
 }  // namespace

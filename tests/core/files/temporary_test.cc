@@ -25,6 +25,25 @@ std::string Read(const ScratchFile& file, uint64_t offset, size_t num_bytes) {
   return bytes;
 }
 
+TEST(TemporariesOf, AreThoseOfATargetAlone) {
+  const std::string folder = testing::TempDir() + "/temporaries";
+  fs::remove_all(folder);
+  EXPECT_THAT(TemporariesOf(folder + "/map"), testing::IsEmpty());  // no folder
+  fs::create_directory(folder);
+  for (const char* name : {"map", "map.tmp-12-0f", "map.tmp-7", "map.tmp-7-journal", "map.tmp-",
+                           "map.previous", "map.previous.tmp-7", "amap.tmp-7"})
+    std::ofstream(folder + "/" + name) << "x";
+  EXPECT_THAT(
+      TemporariesOf(folder + "/map"),
+      testing::ElementsAre(folder + "/map.tmp-12-0f", folder + "/map.tmp-7", folder + "/map.tmp-7-journal"));
+  EXPECT_THAT(TemporariesOf(folder + "/map.previous"), testing::ElementsAre(folder + "/map.previous.tmp-7"));
+  const fs::path before = fs::current_path();
+  fs::current_path(folder);
+  EXPECT_THAT(TemporariesOf("map.previous"), testing::ElementsAre("map.previous.tmp-7"));
+  fs::current_path(before);
+  fs::remove_all(folder);
+}
+
 TEST(ScratchFile, GivesBackWhatWasAppendedAndLeavesNothing) {
   const std::string folder = testing::TempDir() + "/scratch";
   fs::remove_all(folder);

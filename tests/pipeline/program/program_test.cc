@@ -96,7 +96,7 @@ TEST(Program, CommonOptionsReachTheCommand) {
 TEST(Program, ExceptionsEndWithAMessage) {
   const Outcome out_of_memory = RunStage({"stage", "--memory", "77"},
                                          [](const CommandEnvironment&) -> Status { throw std::bad_alloc(); });
-  EXPECT_EQ(out_of_memory.exit_code, 1);
+  EXPECT_EQ(out_of_memory.exit_code, 24);
   const Outcome sqlite = RunStage({"stage"}, [](const CommandEnvironment&) -> Status {
     return WithDatabaseErrors("a.db", []() -> Status {
       SQLite::Database database(":memory:", SQLite::OPEN_READWRITE);
@@ -106,7 +106,7 @@ TEST(Program, ExceptionsEndWithAMessage) {
       return Ok();
     });
   });
-  EXPECT_EQ(sqlite.exit_code, 1);
+  EXPECT_EQ(sqlite.exit_code, 24);
   EXPECT_THAT(sqlite.err, HasSubstr("--memory"));
   EXPECT_THAT(out_of_memory.err, HasSubstr("out of memory, with --memory 77"));
   const Outcome outcome =
