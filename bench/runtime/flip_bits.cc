@@ -7,6 +7,7 @@
 
 #include <unistd.h>
 
+#include "bench/runtime/some_features.h"
 #include "core/base/random.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
@@ -15,20 +16,6 @@
 
 namespace cairn {
 namespace {
-
-Features SomeFeatures(const Camera& camera) {
-  Random random(1);
-  Features features;
-  features.descriptors.resize(60, kSiftDescriptorDim);
-  for (int i = 0; i < 60; ++i) {
-    features.keypoints.push_back({static_cast<float>(random.Uniform(0, camera.width)),
-                                  static_cast<float>(random.Uniform(0, camera.height)), 2, 0});
-    for (int k = 0; k < kSiftDescriptorDim; ++k) {
-      features.descriptors(i, k) = static_cast<uint8_t>(random.UniformInt(0, 60));
-    }
-  }
-  return features;
-}
 
 Status Verify(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(MapFile::Open(path, {}));

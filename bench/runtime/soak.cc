@@ -1,10 +1,7 @@
 // A day of frames: the features of a drive are shown to a tracker back and forth, and every so often from
 // another place, as often as asked.  Fixes, wrong ones, the memory that the process holds in the course of
 // it, and how often a frame asks for some.
-#include <unistd.h>
-
 #include <algorithm>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -13,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "bench/runtime/fix_figures.h"
+#include "bench/runtime/process_figures.h"
 #include "core/capture/capture.h"
 #include "core/images/image_file.h"
 #include "runtime/track/region_tracker.h"
@@ -20,12 +18,6 @@
 
 namespace cairn {
 namespace {
-
-double ResidentMib() {
-  int64_t num_pages = 0, num_resident = 0;
-  std::ifstream("/proc/self/statm") >> num_pages >> num_resident;
-  return static_cast<double>(num_resident) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
 
 struct Frame {
   Features features;
