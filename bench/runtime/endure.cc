@@ -105,7 +105,8 @@ Status Query(const std::shared_ptr<const Map>& map, const Features& features, in
   Localizer localizer(map);
   return InTenths("queries", num, [&](int64_t) -> Status {
     Features asked = features;
-    return localizer.LocalizeFeatures(std::move(asked), camera);
+    CAIRN_RETURN_IF_ERROR(localizer.LocalizeFeatures(std::move(asked), camera));
+    return Ok();
   });
 }
 
@@ -139,8 +140,8 @@ int main(int argc, char** argv) {
   const std::string folder = fmt::format("/dev/shm/endure_{}", getpid());
   std::filesystem::create_directories(folder);
   const cairn::Status status = cairn::Endure(old_map, delta, folder, counts);
-  for (const char* name : {"map", "map.previous", "damaged"}) std::filesystem::remove(folder + "/" + name);
-  std::filesystem::remove(folder);
   if (!status.ok()) fmt::print(stderr, "{}\n", status.error().message);
+  std::error_code error;
+  std::filesystem::remove_all(folder, error);
   return status.ok() ? 0 : 1;
 }

@@ -12,7 +12,8 @@ bool IsOutOfMemory(const std::exception& exception) {
   if (const auto* of_opencv = dynamic_cast<const cv::Exception*>(&exception))
     return of_opencv->code == cv::Error::StsNoMem;
   const auto* of_system = dynamic_cast<const std::system_error*>(&exception);
-  return of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again;
+  return of_system != nullptr && (of_system->code() == std::errc::resource_unavailable_try_again ||
+                                  of_system->code() == std::errc::not_enough_memory);
 }
 
 Error ErrorOfCaught(const char* what) {

@@ -7,6 +7,7 @@
 
 #include <SQLiteCpp/Backup.h>
 
+#include "core/base/no_throw.h"
 #include "core/colmap/colmap_database.h"
 #include "core/files/file.h"
 #include "core/files/file_lock.h"
@@ -133,6 +134,7 @@ Result<SQLite::Database> OpenColmapDatabase(const std::string& path) {
       CAIRN_RETURN_IF_ERROR(CheckSchema(database, path));
       return database;
     } catch (const fs::filesystem_error& error) {
+      if (IsOutOfMemory(error)) throw;
       return MakeError(ErrorCode::kIo, "{}: cannot be copied with its write-ahead log: {}", path,
                        error.what());
     }

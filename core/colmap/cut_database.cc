@@ -44,7 +44,8 @@ std::vector<DatabaseImage> ReadCutDatabaseImages(SQLite::Database& database) {
       if (!id.isInteger() || !query.getColumn(1).isText() || !camera_id.isInteger()) break;
       images.push_back({id.getUInt(), query.getColumn(1).getString(), camera_id.getUInt()});
     }
-  } catch (const SQLite::Exception&) {  // the first page that is not there
+  } catch (const SQLite::Exception& exception) {  // the first page that is not there
+    if (exception.getErrorCode() == SQLITE_NOMEM) throw;
   }
   return images;
 }

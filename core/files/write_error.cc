@@ -15,6 +15,8 @@ ErrorCode CodeOf(int error_number) {
     case EPERM:
     case EROFS:
       return ErrorCode::kReadOnly;
+    case ENOMEM:
+      return ErrorCode::kNoMemory;
     default:
       return ErrorCode::kIo;
   }

@@ -13,6 +13,7 @@
 #include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/no_throw.h"
 #include "core/base/text.h"
 #include "core/features/smaller_image.h"
 #include "core/files/file.h"
@@ -191,6 +192,7 @@ Result<std::vector<cv::Mat>> LearnedModel::Net::Run(const cv::Mat& grey) {
     net.setInput(input);
     net.forward(found, outputs);
   } catch (const std::exception& exception) {
+    if (IsOutOfMemory(exception)) throw;
     return MakeError(ErrorCode::kUnsupported, "{}: OpenCV {} does not run the net on {} x {} px: {}", path,
                      CV_VERSION, grey.cols, grey.rows, ReasonOf(exception));
   }
@@ -275,6 +277,7 @@ Result<LearnedModel> LearnedModel::Open(const std::string& path) {
   try {
     net->net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
   } catch (const std::exception& exception) {
+    if (IsOutOfMemory(exception)) throw;
     return MakeError(ErrorCode::kUnsupported, "{}: OpenCV {} does not build the net: {}", path, CV_VERSION,
                      ReasonOf(exception));
   }

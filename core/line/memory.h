@@ -21,7 +21,7 @@ inline constexpr int64_t kProgramBytes = int64_t{64} << 20;
 void ReturnFreedMemory();
 
 // Refuses work that is estimated not to fit, before it begins.  `work` names it: "grouping the matches of
-// m.db".  Errors: Failed, with the estimate and the limit.
+// m.db".  Errors: NoMemory, with the estimate and the limit.
 //
 // Most stages hold their input in a form that takes a multiple of its file's bytes (measured,
 // bench/crash/README.md).

@@ -163,7 +163,7 @@ Result<std::string> MapFile::ReadBlock(int64_t block) const {
   const std::lock_guard lock(connection_->mutex);
   return WithinSteps(connection_->database, path_, num_bytes_, [&]() -> Result<std::string> {
     SQLite::Statement& query = connection_->block;
-    query.reset();
+    (void)query.tryReset();  // says again what the last step said
     query.bind(1, block);
     if (!query.executeStep()) return MakeError(ErrorCode::kCorrupt, "{} is not there", NameOf(block));
     std::string bytes(BlobView(query.getColumn(0)));

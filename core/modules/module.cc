@@ -26,7 +26,7 @@ bool IsMemoryLimited() {
 
 // A segment that cannot be mapped may also be one that the file system does not let run.
 bool IsOfMemory(const std::string& text) {
-  return text.find("annot allocate memory") != std::string::npos ||
+  return text == "out of memory" || text.find("annot allocate memory") != std::string::npos ||
          text.find("cannot map zero-fill pages") != std::string::npos ||
          (text.find("failed to map segment") != std::string::npos && IsMemoryLimited());
 }

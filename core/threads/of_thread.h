@@ -14,7 +14,7 @@ namespace internal {
 class ThreadKey {
  public:
   explicit ThreadKey(void (*destroy)(void*)) : is_made_(pthread_key_create(&key_, destroy) == 0) {}
-  // Where a library is unloaded, or the program ends: what threads still have stays.
+  // Where the program ends: what threads still have stays.
   ~ThreadKey() {
     if (is_made_) pthread_key_delete(key_);
   }

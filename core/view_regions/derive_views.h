@@ -36,7 +36,7 @@ struct DerivedViews {
 // those far beyond it by a sample of their boundaries, others when all crossings are counted, before they are
 // kept.  Work is done in small parts, each reported; cancelling takes effect within one.  Errors: Corrupt (no
 // clean plan: CheckFloorPlan, a vertex outside of the box, a wall that does not lie where its pieces do),
-// Failed (memory), Unsupported (more than kMaxNumDividedWalls, or than 32 bits can number), Cancelled.
+// NoMemory, Unsupported (more than kMaxNumDividedWalls, or than 32 bits can number), Cancelled.
 Result<DerivedViews> DeriveViews(const FloorPlan& plan, int num_threads, int64_t memory_mib,
                                  Progress& progress);
 

@@ -62,14 +62,14 @@ Status CheckIsText(const std::string& path, const char* what_is_taken) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: neither a file nor a folder; {}", path, what_is_taken);
   }
   if (IsSqliteFile(path)) {
-    const bool is_map = WithDatabaseErrors(path, [&]() -> Status {
-                          SQLite::Database database = OpenImmutable(path);
-                          const Status status = CheckMapVersion(database, path, kMapVersionMajor);
-                          const bool is_foreign =
-                              !status.ok() && status.error().code == ErrorCode::kForeignFile;
-                          return is_foreign ? status : Ok();
-                        }).ok();
-    if (is_map) {
+    const Status is_map = WithDatabaseErrors(path, [&]() -> Status {
+      SQLite::Database database = OpenImmutable(path);
+      const Status status = CheckMapVersion(database, path, kMapVersionMajor);
+      const bool is_foreign = !status.ok() && status.error().code == ErrorCode::kForeignFile;
+      return is_foreign ? status : Ok();
+    });
+    if (!is_map.ok() && is_map.error().code == ErrorCode::kNoMemory) return is_map;
+    if (is_map.ok()) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a compiled map; `cairn inspect` shows it, and {}",
                        path, what_is_taken);
     }

@@ -1,6 +1,7 @@
 #include "pipeline/program/printable_stream.h"
 
 #include <algorithm>
+#include <new>
 #include <utility>
 
 #include "core/base/printable.h"
@@ -22,7 +23,20 @@ size_t NumBegunBytes(std::string_view text) {
 
 }  // namespace
 
-PrintableStream::Buffer::~Buffer() { Write(begun_); }
+// The stream would take it for a target that cannot be written.
+template <typename Body>
+bool PrintableStream::Buffer::NotesLackOfMemory(Body&& body) {
+  try {
+    return body();
+  } catch (const std::bad_alloc&) {
+    lacked_memory_ = true;
+    return false;
+  }
+}
+
+PrintableStream::Buffer::~Buffer() {
+  NotesLackOfMemory([&] { return Write(begun_); });
+}
 
 bool PrintableStream::Buffer::Write(std::string_view text) {
   const std::string printable = Printable(text);
@@ -37,15 +51,18 @@ PrintableStream::Buffer::int_type PrintableStream::Buffer::overflow(int_type c) 
 }
 
 std::streamsize PrintableStream::Buffer::xsputn(const char* text, std::streamsize size) {
-  begun_.append(text, static_cast<size_t>(size));
-  const std::string all = std::exchange(begun_, "");
-  const size_t num_whole = all.size() - NumBegunBytes(all);
-  begun_ = all.substr(num_whole);
-  return Write(std::string_view(all).substr(0, num_whole)) ? size : 0;
+  const bool written = NotesLackOfMemory([&] {
+    begun_.append(text, static_cast<size_t>(size));
+    const std::string all = std::exchange(begun_, "");
+    const size_t num_whole = all.size() - NumBegunBytes(all);
+    begun_ = all.substr(num_whole);
+    return Write(std::string_view(all).substr(0, num_whole));
+  });
+  return written ? size : 0;
 }
 
 int PrintableStream::Buffer::sync() {
-  const bool written = Write(std::exchange(begun_, ""));
+  const bool written = NotesLackOfMemory([&] { return Write(std::exchange(begun_, "")); });
   return target_->pubsync() == 0 && written ? 0 : -1;
 }
 

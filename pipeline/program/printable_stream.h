@@ -16,6 +16,9 @@ class PrintableStream : public std::ostream {
     rdbuf(&buffer_);
   }
 
+  // Whether some of the text is lost for lack of memory; the stream is bad then.
+  bool lacked_memory() const { return buffer_.lacked_memory(); }
+
  private:
   class Buffer : public std::streambuf {
    public:
@@ -24,6 +27,8 @@ class PrintableStream : public std::ostream {
     Buffer(const Buffer&) = delete;
     Buffer& operator=(const Buffer&) = delete;
 
+    bool lacked_memory() const { return lacked_memory_; }
+
    protected:
     int_type overflow(int_type c) override;
     std::streamsize xsputn(const char* text, std::streamsize size) override;
@@ -31,9 +36,12 @@ class PrintableStream : public std::ostream {
 
    private:
     bool Write(std::string_view text);
+    template <typename Body>
+    bool NotesLackOfMemory(Body&& body);
 
     std::streambuf* target_;
     std::string begun_;  // a character whose last bytes are still to come
+    bool lacked_memory_ = false;
   };
 
   Buffer buffer_;

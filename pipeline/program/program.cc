@@ -122,9 +122,16 @@ Status RunCommand(const ChosenCommand& chosen, const CommonArguments& arguments,
   const std::string report_file =
       arguments.report_file.empty() && step ? step->ReportPath() : arguments.report_file;
   // Outputs in progress are left as after a kill.
-  const StopDeadline deadline([&] { std::_Exit(Report(chosen, arguments, kStopped, err)); });
+  const StopDeadline deadline([&] {
+    try {
+      Report(chosen, arguments, kStopped, err);
+    } catch (const std::exception&) {  // there is no memory to say so
+    }
+    std::_Exit(static_cast<int>(kStopped.code));
+  });
   StageReport report;
   std::ostringstream printed;
+  printed.exceptions(std::ios::badbit);  // only for lack of memory
   environment.report = &report;
   environment.out = report_file.empty() ? &out : &printed;
   Status status = RunCaught(*chosen.command, environment);
@@ -243,6 +250,10 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
   Status status = CheckOutputs(*chosen.arguments, chosen.command->may_be_output);
   if (status.ok()) status = RunCommand(chosen, arguments, environment, out, err);
   out.flush();
+  if (status.ok() && out.lacked_memory())
+    status = MakeError(ErrorCode::kNoMemory,
+                       "the command is done and its files are written, but what it prints is not whole: out "
+                       "of memory");
   if (status.ok() && !out)
     status = MakeError(ErrorCode::kIo,
                        "the command is done and its files are written, but standard output cannot be "

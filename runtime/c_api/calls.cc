@@ -10,24 +10,26 @@ namespace {
 
 struct Sentence {
   std::string text;
-  bool is_lost = false;  // there was no memory for it
 };
+
+thread_local bool is_lost = false;  // there was no memory for this thread's sentence
 
 }  // namespace
 
 const char* LastError() noexcept {
+  if (is_lost) return kOutOfMemory;
   const Sentence* const last = OfThread<Sentence>();
-  return last == nullptr || last->is_lost ? kOutOfMemory : last->text.c_str();
+  return last == nullptr ? "" : last->text.c_str();
 }
 
 void SetLastError(const char* function, const char* message) noexcept {
+  is_lost = true;
   Sentence* const last = OfThread<Sentence>();
   if (last == nullptr) return;
-  last->is_lost = true;
   try {
     last->text = message;
     if (!last->text.starts_with(function)) last->text.insert(0, std::string(function) + ": ");
-    last->is_lost = false;
+    is_lost = false;
   } catch (const std::bad_alloc&) {  // is lost
   }
 }

@@ -1,5 +1,6 @@
 #include "runtime/map/block_cache.h"
 
+#include <new>
 #include <utility>
 
 #include "core/line/memory.h"
@@ -26,7 +27,12 @@ std::shared_ptr<const void> BlockCache::Insert(int64_t key, std::shared_ptr<cons
   std::unique_lock lock(mutex_);
   if (const auto found = index_.find(key); found != index_.end()) return found->second->block;
   entries_.push_front({key, std::move(block), num_bytes});
-  index_[key] = entries_.begin();
+  try {
+    index_[key] = entries_.begin();
+  } catch (const std::bad_alloc&) {
+    entries_.pop_front();
+    throw;
+  }
   num_bytes_ += num_bytes;
   ++num_loads_;
   std::shared_ptr<const void> inserted = entries_.front().block;

@@ -171,15 +171,15 @@ class KeptMap {
     if (is_there && !S_ISREG(before.st_mode) && !S_ISLNK(before.st_mode))
       return MakeError(ErrorCode::kIo, "{}: is not a file, so the old map cannot be kept there; remove it",
                        previous_);
-    CAIRN_ASSIGN_OR_RETURN(const std::string second, SecondName());
+    CAIRN_ASSIGN_OR_RETURN(std::string second, SecondName());
     if (is_there && Exchange(second, previous_) == 0) {
-      aside_ = second;
+      aside_ = std::move(second);  // without asking for memory: what is aside must be known
     } else {
       // There is nothing to keep, or the file system cannot exchange: the older one is moved aside first.
       if (is_there) {
-        const std::string aside = RandomTemporaryPath(previous_);
+        std::string aside = RandomTemporaryPath(previous_);
         if (rename(previous_.c_str(), aside.c_str()) != 0) return CannotKeep(second, errno);
-        aside_ = aside;
+        aside_ = std::move(aside);
       }
       if (rename(second.c_str(), previous_.c_str()) != 0) {
         const int error = errno;
@@ -306,6 +306,7 @@ Status RollBackMap(const std::string& given_path, const UpdateOptions& options) 
     CAIRN_RETURN_IF_ERROR(CheckAskedFor(before.head(), previous, options.name, options.min_epoch));
     // The map in place may be the damaged one: that it cannot be opened is no reason to keep it.
     const Result<MapFile> map = MapFile::Open(map_path, {.public_key = options.public_key});
+    if (!map.ok() && map.error().code == ErrorCode::kNoMemory) return map.error();
     if (map.ok() && (map->seal().is_signed() || before.seal().is_signed())) {
       CAIRN_RETURN_IF_ERROR(
           CheckFollows(before.head(), previous, map->head(), map_path, /*allow_older=*/true));

@@ -257,7 +257,7 @@ Status RobotLog::Writer::Keep(const LoggedFrame& frame, const std::string& name,
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder_ + "/images/" + name, bytes));
   }
   SQLite::Database& database = *database_;
-  const std::map<CameraId, Camera> cameras_before = cameras_;
+  std::map<CameraId, Camera> cameras_before = cameras_;
   const LogBudget budget_before = budget_;
   const ImageId image_id = last_id_ + 1;
   const Pose& pose = frame.cam_from_world;
@@ -278,8 +278,8 @@ Status RobotLog::Writer::Keep(const LoggedFrame& frame, const std::string& name,
     budget_.bytes -= num_bytes;
     SaveBudget();
     transaction.commit();
-  } catch (const SQLite::Exception&) {
-    cameras_ = cameras_before;
+  } catch (...) {
+    cameras_.swap(cameras_before);
     budget_ = budget_before;
     throw;
   }

@@ -1,6 +1,7 @@
 #include "runtime/robot_log/shared_log.h"
 
 #include <mutex>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -61,8 +62,12 @@ void SharedLog::Offer(const Query& query, const Localization& found) {
   });
   state_->num_kept = state_->log->num_kept();
   if (kept.ok()) return;
-  state_->error = kept.error();
   state_->log.reset();
+  try {
+    state_->error = kept.error();
+  } catch (const std::bad_alloc&) {
+    state_->error = Error{ErrorCode::kNoMemory, "out of memory"};  // as long as a string may be without any
+  }
 }
 
 void SharedLog::Offer(QueryFrame* frame, const Localization& found) {

@@ -12,7 +12,7 @@ namespace cairn::extract_features {
 inline constexpr int64_t kNumImagesPerBatch = 64;
 
 // How many of `num_threads` threads (0: all cores) can each work on a capture's largest image within
-// `memory_mib`.  Errors: Failed when not even one fits: says how much memory one takes.
+// `memory_mib`.  Errors: NoMemory when not even one fits: says how much memory one takes.
 Result<int> ThreadsThatFit(const Capture& capture, const ExtractFeaturesOptions& options, int num_threads,
                            int64_t memory_mib);
 

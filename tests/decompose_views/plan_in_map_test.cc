@@ -57,7 +57,7 @@ TEST(PlanInMap, RegionsAreDerivedWhereTheyAreAskedFor) {
   EXPECT_EQ(Regions(*map)->get(), views->get()) << "derived once";
   NoProgress progress;
   const auto too_large = MapWith(whole, false)->FloorViews(1, 0, progress);
-  EXPECT_EQ(too_large.error().code, ErrorCode::kFailed);
+  EXPECT_EQ(too_large.error().code, ErrorCode::kNoMemory);
   EXPECT_THAT(too_large.error().message, HasSubstr("view boundaries"));
 }
 

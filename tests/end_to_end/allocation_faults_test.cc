@@ -64,13 +64,15 @@ class AllocationFaults : public testing::Test {
     return std::atoll(ReadFile(folder_ / "log").value().c_str());
   }
 
-  // Refuses requests of `command`: about `kNumFaults` of them, evenly, and as many of what the program does
-  // before any command; all of them where CAIRN_FAULTS_ALL is set.  Either there was another way, or it says
-  // so, with the code of its own.  `check`: what is in the folder then, less what is temporary.
+  // Refuses requests of `command`: about `kNumFaults` of them, evenly, as many of what the program does
+  // before any command, and each of the last ones, where files take their places; all of them where
+  // CAIRN_FAULTS_ALL is set.  Either there was another way, or it says so, with the code of its own. `check`:
+  // what is in the folder then, less what is temporary.
   void ForSomeFaults(const std::string& command, const Files& before,
                      const std::function<void(bool succeeded, const Files&)>& check) const {
     const int64_t num_of_start = NumRequests("cairn --version", {});
     const int64_t num_requests = NumRequests(command, before);
+    const std::string printed = RunWithFault(command, before, 0).out;
     ASSERT_GT(num_requests, num_of_start);
     const bool all = std::getenv("CAIRN_FAULTS_ALL") != nullptr;
     int num_refused = 0, num_other_ways = 0;
@@ -79,10 +81,13 @@ class AllocationFaults : public testing::Test {
         SCOPED_TRACE(fmt::format("{}, request {} of {} {}", command, at, num_requests, more));
         const ProgramRun run = RunWithFault(command, before, at, more);
         const int64_t step = at <= num_of_start ? num_of_start : num_requests - num_of_start;
-        at += all ? 1 : std::max<int64_t>(1, step / kNumFaults);
+        const bool each = all || (more.empty() && at > num_requests - kNumLast);
+        at += each ? 1 : std::max<int64_t>(1, step / kNumFaults);
         EXPECT_THAT(run.exit_code, AnyOf(0, static_cast<int>(ErrorCode::kNoMemory))) << run.err;
         if (run.exit_code != 0) {
           EXPECT_THAT(run.err, HasSubstr("out of memory"));
+        } else {
+          EXPECT_EQ(run.out, printed);
         }
         ++(run.exit_code == 0 ? num_other_ways : num_refused);
         Files after;
@@ -97,7 +102,7 @@ class AllocationFaults : public testing::Test {
     EXPECT_GT(num_refused, kNumFaults);
   }
 
-  static constexpr int kNumFaults = 30;
+  static constexpr int kNumFaults = 30, kNumLast = 150;
 
   TemporaryFolder folder_;
   std::string work_;

@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/no_throw.h"
 #include "core/images/image_file.h"
 
 namespace cairn::pipeline {
@@ -116,6 +117,7 @@ Result<BagPicture> PictureOf(const ImageMessage& image) {
     }
     return picture;
   } catch (const cv::Exception& exception) {
+    if (IsOutOfMemory(exception)) throw;
     return MakeError(ErrorCode::kCorrupt, "OpenCV says: {}", exception.err);
   }
 }
