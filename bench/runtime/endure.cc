@@ -22,10 +22,8 @@
 namespace cairn {
 namespace {
 
-namespace fs = std::filesystem;
-
 // A row for each tenth.
-Status InTenths(const std::string& what, int64_t num, const std::function<Status(int64_t)>& once) {
+Status InTenths(const std::string& what, int64_t num, const std::function<Status()>& once) {
   if (num == 0) return Ok();
   fmt::print("| {} | us each | MiB held | open files |\n|--:|--:|--:|--:|\n", what);
   constexpr int kNumRows = 10;
@@ -33,7 +31,7 @@ Status InTenths(const std::string& what, int64_t num, const std::function<Status
   for (int row = 1; row <= kNumRows; ++row) {
     const int64_t end = num * row / kNumRows, begin = done;
     const auto start = std::chrono::steady_clock::now();
-    for (; done < end; ++done) CAIRN_RETURN_IF_ERROR(once(done));
+    for (; done < end; ++done) CAIRN_RETURN_IF_ERROR(once());
     const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - start;
     fmt::print("| {} | {:.1f} | {:.2f} | {} |\n", done,
                took.count() / static_cast<double>(std::max<int64_t>(1, end - begin)), ResidentMib(),
@@ -48,7 +46,7 @@ Status Update(const std::string& old_map, const std::string& delta, const std::s
   const std::string map = folder + "/map";
   CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_map));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(map, old_bytes));
-  CAIRN_RETURN_IF_ERROR(InTenths("updates, each with its way back", num, [&](int64_t) -> Status {
+  CAIRN_RETURN_IF_ERROR(InTenths("updates, each with its way back", num, [&]() -> Status {
     CAIRN_ASSIGN_OR_RETURN(const bool updated, UpdateMap(map, delta));
     if (!updated) return MakeError(ErrorCode::kFailed, "{}: was not updated", map);
     return RollBackMap(map);
@@ -83,7 +81,7 @@ Status Open(const std::string& old_map, const Features& features, const std::str
   const std::string path = folder + "/damaged";
   Random random(1);
   std::map<std::string, int64_t> ends;
-  CAIRN_RETURN_IF_ERROR(InTenths("opens of a damaged map", num, [&](int64_t) -> Status {
+  CAIRN_RETURN_IF_ERROR(InTenths("opens of a damaged map", num, [&]() -> Status {
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(path, Damaged(bytes, &random)));
     const auto map = Map::Open(path);
     if (!map.ok()) {
@@ -103,7 +101,7 @@ Status Open(const std::string& old_map, const Features& features, const std::str
 Status Query(const std::shared_ptr<const Map>& map, const Features& features, int64_t num) {
   const Camera camera = map->head().cameras.front();
   Localizer localizer(map);
-  return InTenths("queries", num, [&](int64_t) -> Status {
+  return InTenths("queries", num, [&]() -> Status {
     Features asked = features;
     CAIRN_RETURN_IF_ERROR(localizer.LocalizeFeatures(std::move(asked), camera));
     return Ok();

@@ -3,37 +3,24 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
-#include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
+#include "tests/end_to_end/signed_epochs.h"
 
 namespace cairn {
 namespace {
 
-namespace fs = std::filesystem;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-using Files = std::map<std::string, std::string>;  // by name
-
-// Epochs 1 to 3 of a small map, a delta from the second to the third, a key.
-class AllocationFaults : public testing::Test {
+class AllocationFaults : public SignedEpochs {
  protected:
-  AllocationFaults() : folder_("allocation_faults_test"), work_(folder_ / "work") {
-    Run("cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + folder_ / "unsigned");
-    Run("cairn keygen " + folder_ / "key");
-    for (const std::string epoch : {"1", "2", "3"})
-      Run("cairn sign " + folder_ / "unsigned" + " --key " + folder_ / "key" + " --epoch " + epoch + " -o " +
-          folder_ / epoch);
-    Run("cairn update delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
-        folder_ / "delta");
-  }
+  AllocationFaults() : SignedEpochs("allocation_faults_test") {}
 
   void SetUp() override {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -41,38 +28,31 @@ class AllocationFaults : public testing::Test {
 #endif
   }
 
-  static void Run(const std::string& command) {
-    const ProgramRun run = RunShell(command);
-    EXPECT_EQ(run.exit_code, 0) << command << ": " << run.err;
-  }
-
-  std::string Bytes(const std::string& name) const { return ReadFile(folder_ / name).value(); }
-
-  ProgramRun RunWithFault(const std::string& command, const Files& before, int64_t at,
+  ProgramRun RunWithFault(const std::string& command, const Contents& before, int64_t at,
                           const std::string& more = "") const {
-    fs::remove_all(work_);
-    fs::create_directories(work_);
-    for (const auto& [name, bytes] : before) EXPECT_TRUE(WriteFileAtomically(work_ + "/" + name, bytes).ok());
-    fs::remove(folder_ / "log");
+    FillWork(before);
+    std::filesystem::remove(folder_ / "log");
     return RunShell(fmt::format("LD_PRELOAD='{}' FAULT_AT={} FAULT_LOG='{}' {} {}", CAIRN_ALLOCATION_LIBRARY,
                                 at, folder_ / "log", more, command));
   }
 
-  int64_t NumRequests(const std::string& command, const Files& before) const {
+  // `printed`: what the command says where none is refused.
+  int64_t NumRequests(const std::string& command, const Contents& before, std::string* printed) const {
     const ProgramRun run = RunWithFault(command, before, 0);
     EXPECT_EQ(run.exit_code, 0) << run.err;
-    return std::atoll(ReadFile(folder_ / "log").value().c_str());
+    *printed = run.out;
+    return std::atoll(Bytes("log").c_str());
   }
 
   // Refuses requests of `command`: about `kNumFaults` of them, evenly, as many of what the program does
   // before any command, and each of the last ones, where files take their places; all of them where
   // CAIRN_FAULTS_ALL is set.  Either there was another way, or it says so, with the code of its own. `check`:
   // what is in the folder then, less what is temporary.
-  void ForSomeFaults(const std::string& command, const Files& before,
-                     const std::function<void(bool succeeded, const Files&)>& check) const {
-    const int64_t num_of_start = NumRequests("cairn --version", {});
-    const int64_t num_requests = NumRequests(command, before);
-    const std::string printed = RunWithFault(command, before, 0).out;
+  void ForSomeFaults(const std::string& command, const Contents& before,
+                     const std::function<void(bool succeeded, const Contents&)>& check) const {
+    std::string printed;
+    const int64_t num_of_start = NumRequests("cairn --version", {}, &printed);
+    const int64_t num_requests = NumRequests(command, before, &printed);
     ASSERT_GT(num_requests, num_of_start);
     const bool all = std::getenv("CAIRN_FAULTS_ALL") != nullptr;
     int num_refused = 0, num_other_ways = 0;
@@ -90,12 +70,7 @@ class AllocationFaults : public testing::Test {
           EXPECT_EQ(run.out, printed);
         }
         ++(run.exit_code == 0 ? num_other_ways : num_refused);
-        Files after;
-        for (const fs::directory_entry& entry : fs::directory_iterator(work_)) {
-          const std::string name = entry.path().filename().string();
-          if (name.find(".tmp-") == std::string::npos) after[name] = ReadFile(entry.path().string()).value();
-        }
-        check(run.exit_code == 0, after);
+        check(run.exit_code == 0, WorkThatStays());
       }
     }
     std::printf("%s: %d refused, %d went on\n", command.c_str(), num_refused, num_other_ways);
@@ -103,16 +78,13 @@ class AllocationFaults : public testing::Test {
   }
 
   static constexpr int kNumFaults = 30, kNumLast = 150;
-
-  TemporaryFolder folder_;
-  std::string work_;
 };
 
 TEST_F(AllocationFaults, UpdateInPlaceLeavesTheOldOrTheNewMap) {
   const std::string older = Bytes("1"), old_map = Bytes("2"), new_map = Bytes("3");
   ForSomeFaults("cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place --public-key " +
                     folder_ / "key.pub",
-                {{"map", old_map}, {"map.previous", older}}, [&](bool succeeded, const Files& after) {
+                {{"map", old_map}, {"map.previous", older}}, [&](bool succeeded, const Contents& after) {
                   const bool is_new = after.at("map") == new_map;
                   EXPECT_TRUE(is_new || (!succeeded && after.at("map") == old_map));
                   EXPECT_TRUE(after.at("map.previous") == (is_new ? old_map : older));
@@ -123,7 +95,7 @@ TEST_F(AllocationFaults, UpdateInPlaceLeavesTheOldOrTheNewMap) {
 TEST_F(AllocationFaults, RollbackExchangesBothMapsOrNone) {
   const std::string older = Bytes("1"), old_map = Bytes("2");
   ForSomeFaults("cairn update rollback " + work_ + "/map --public-key " + folder_ / "key.pub",
-                {{"map", old_map}, {"map.previous", older}}, [&](bool succeeded, const Files& after) {
+                {{"map", old_map}, {"map.previous", older}}, [&](bool succeeded, const Contents& after) {
                   const bool is_back = after.at("map") == older;
                   EXPECT_TRUE(is_back || (!succeeded && after.at("map") == old_map));
                   EXPECT_TRUE(after.at("map.previous") == (is_back ? old_map : older));
@@ -140,7 +112,7 @@ TEST_F(AllocationFaults, WhatIsWrittenIsWholeOrNotThere) {
         Case{"cairn sign " + folder_ / "unsigned" + key + " --epoch 3", "3"},
         Case{"cairn update delta " + folder_ / "2" + " " + folder_ / "3" + key, "delta"}}) {
     const std::string expected = Bytes(each.expected);
-    ForSomeFaults(each.command + " -o " + work_ + "/out", {}, [&](bool succeeded, const Files& after) {
+    ForSomeFaults(each.command + " -o " + work_ + "/out", {}, [&](bool succeeded, const Contents& after) {
       const bool is_there = after.contains("out");
       EXPECT_TRUE(is_there || !succeeded);
       EXPECT_TRUE(!is_there || after.at("out") == expected);
@@ -151,7 +123,7 @@ TEST_F(AllocationFaults, WhatIsWrittenIsWholeOrNotThere) {
 // No map is called damaged, and no signature false, because there was no memory to look at it.
 TEST_F(AllocationFaults, VerifyJudgesNothing) {
   ForSomeFaults("cairn verify " + folder_ / "2" + " --public-key " + folder_ / "key.pub", {},
-                [](bool, const Files&) {});
+                [](bool, const Contents&) {});
 }
 
 }  // namespace

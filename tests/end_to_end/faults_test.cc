@@ -16,6 +16,7 @@
 #include "core/seal/key_ring.h"
 #include "core/seal/map_seal.h"
 #include "tests/end_to_end/program_run.h"
+#include "tests/end_to_end/signed_epochs.h"
 
 namespace cairn {
 namespace {
@@ -35,36 +36,9 @@ const std::vector<Kind>& Kinds() {
   return kinds;
 }
 
-// The files of a folder, by name.
-using Contents = std::map<std::string, std::string>;
-
-Contents ContentsOf(const fs::path& folder) {
-  Contents contents;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    contents[entry.path().filename().string()] = ReadFile(entry.path().string()).value();
-  return contents;
-}
-
-// Epochs 1, 2 and 3 of a small map, a delta from the second to the third, keys.
-class Faults : public testing::Test {
+class Faults : public SignedEpochs {
  protected:
-  Faults() : folder_("faults_test"), work_(folder_ / "work") {
-    fs::create_directories(work_);
-    Run("cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + folder_ / "unsigned");
-    Run("cairn keygen " + folder_ / "key");
-    for (const std::string epoch : {"1", "2", "3"})
-      Run("cairn sign " + folder_ / "unsigned" + " --key " + folder_ / "key" + " --epoch " + epoch + " -o " +
-          folder_ / epoch);
-    Run("cairn update delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
-        folder_ / "delta");
-  }
-
-  static void Run(const std::string& command) {
-    const ProgramRun run = RunShell(command);
-    EXPECT_EQ(run.exit_code, 0) << command << ": " << run.err;
-  }
-
-  std::string Bytes(const std::string& name) const { return ReadFile(folder_ / name).value(); }
+  Faults() : SignedEpochs("faults_test") {}
 
   // Runs a command on a fresh folder with `before` in it, and lets one call after the other fail, for all
   // kinds, until there is none left.  `check`: the run and what is in the folder then, less what
@@ -76,9 +50,7 @@ class Faults : public testing::Test {
       for (const int& error : kind.errors) {
         for (int at = 1;; ++at) {
           ASSERT_LT(at, 2000);
-          fs::remove_all(work_);
-          fs::create_directories(work_);
-          for (const auto& [name, bytes] : before) WriteFile(work_ + "/" + name, bytes);
+          FillWork(before);
           const std::string log = folder_ / "log";
           fs::remove(log);
           const ProgramRun run = RunWithFault(kind.name, error, at, log, command);
@@ -91,10 +63,7 @@ class Faults : public testing::Test {
           const std::string what =
               fmt::format("{}, {} {} of {}", command, std::strerror(error), at, ReadFile(log).value());
           SCOPED_TRACE(what);
-          Contents after = ContentsOf(work_);
-          std::erase_if(after,
-                        [](const auto& file) { return file.first.find(".tmp-") != std::string::npos; });
-          check(run, after);
+          check(run, WorkThatStays());
           EXPECT_LT(run.exit_code, 64) << run.err;  // no crash
           if (run.exit_code != 0) {
             EXPECT_THAT(run.err, HasSubstr(folder_.string()));  // which file it was
@@ -119,16 +88,6 @@ class Faults : public testing::Test {
   std::string Scope() const {
     return std::getenv("CAIRN_FAULTS_EVERYWHERE") != nullptr ? "" : folder_.string();
   }
-
-  static void WriteFile(const std::string& path, const std::string& bytes) {
-    std::FILE* const file = std::fopen(path.c_str(), "wb");
-    std::fwrite(bytes.data(), 1, bytes.size(), file);
-    std::fclose(file);
-    chmod(path.c_str(), 0600);
-  }
-
-  TemporaryFolder folder_;
-  std::string work_;
 };
 
 TEST_F(Faults, UpdateInPlaceLeavesTheOldOrTheNewMapAndTheRightOneBefore) {
@@ -194,9 +153,7 @@ class RingFaults : public Faults {
     for (const char* kind : {"open", "write", "sync", "rename", "link", "unlink", "close"}) {
       for (int at = 1;; ++at) {
         ASSERT_LT(at, 2000);
-        fs::remove_all(work_);
-        fs::create_directories(work_);
-        for (const auto& [name, bytes] : before_) WriteFile(work_ + "/" + name, bytes);
+        FillWork(before_);
         fs::remove(folder_ / "log");
         const ProgramRun run = RunWithFault(kind, "killed", at, folder_ / "log", command);
         if (!fs::exists(folder_ / "log")) {
@@ -230,7 +187,7 @@ TEST_F(RingFaults, KilledUpdateLeavesATrustedMapAndTheNextOneWorks) {
     EXPECT_EQ(again.exit_code, 0) << again.err;
     EXPECT_EQ(TrustedEpoch("map"), 3U);
     EXPECT_EQ(TrustedEpoch("map.previous"), 2U);
-    EXPECT_EQ(ContentsOf(work_).size(), 3U);  // nothing temporary stays
+    EXPECT_EQ(Work().size(), 3U);  // nothing temporary stays
     EXPECT_EQ(RunShell(rollback_).exit_code, 0);
     EXPECT_EQ(TrustedEpoch("map"), 2U);
     EXPECT_EQ(TrustedEpoch("map.previous"), 3U);
@@ -281,7 +238,7 @@ TEST_F(Faults, UpdateWithoutHardLinksKeepsTheMapBeforeToo) {
                    "cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(fs::exists(folder_ / "log"));  // a link was tried
-  EXPECT_EQ(ContentsOf(work_), (Contents{{"map", Bytes("3")}, {"map.previous", Bytes("2")}}));
+  EXPECT_EQ(Work(), (Contents{{"map", Bytes("3")}, {"map.previous", Bytes("2")}}));
   EXPECT_EQ(fs::status(work_ + "/map.previous").permissions(), fs::perms{0640});
 }
 

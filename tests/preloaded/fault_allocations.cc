@@ -1,6 +1,7 @@
 // A library to be preloaded: lets one request for memory fail, of those that are made from main on.
 //   FAULT_AT=N        the N-th request fails (from 1); 0: none does
 //   FAULT_FROM=1      all after it fail, too
+//   FAULT_TRAP=1      the process stops there, for a debugger
 //   FAULT_LOG=FILE    gets the number of requests where none failed, and "failed" where one did
 
 #include <dlfcn.h>
