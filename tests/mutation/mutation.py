@@ -23,6 +23,7 @@ import resource
 import shlex
 import subprocess
 import sys
+import tempfile
 import time
 import tomllib
 
@@ -111,6 +112,7 @@ class Build:
     def __init__(self, folder):
         self.folder = folder
         self.commands = {}
+        self.headers = {}
         for entry in json.loads((folder / "compile_commands.json").read_text()):
             text = entry["command"]
             command = shlex.split(text)
@@ -124,14 +126,32 @@ class Build:
                 self.commands.setdefault(file.resolve(), command)
 
     def compile(self, source, changed, to):
-        """The command that compiles `changed` as if it were `source`."""
-        command = list(self.commands[source.resolve()])
+        """The command that compiles `changed` as if it were `source`, optimized less: half of the time is the optimizer's."""
+        command = ["-O1" if word in ("-O2", "-O3") else word for word in self.commands[source.resolve()]]
         command[command.index("-o") + 1] = str(to)
         command[command.index("-c") + 1] = str(changed)
+        if "-include" in command:
+            place = command.index("-include") + 1
+            command[place] = self.headers.get(command[place], command[place])
         for option in ("-MT", "-MF"):
             if option in command:
                 command[command.index(option) + 1] = f"{to}.d"
         return command
+
+    def precompile(self, source, folder):
+        """Compiles the header that the compiler puts before `source` for what `compile` says; whatever compiles it after that has it."""
+        command = self.commands[source.resolve()]
+        if "-include" not in command or command[command.index("-include") + 1] in self.headers:
+            return
+        header = pathlib.Path(command[command.index("-include") + 1])
+        to = folder / f"precompiled_{len(self.headers)}" / header.name
+        to.parent.mkdir()
+        to.write_text("\n".join(re.findall("^#include.*$", header.read_text(), re.MULTILINE)))
+        compile = self.compile(source, to, f"{to}.gch")
+        place = compile.index("-include")
+        compile[place : place + 2] = ["-x", "c++-header"]
+        subprocess.run(compile, cwd=self.folder, check=True, stdout=subprocess.DEVNULL)
+        self.headers[str(header)] = str(to)
 
     def link(self, test, changed, to):
         """The command that links a test with an object that stands before its libraries: what it defines is not taken from there."""
@@ -147,13 +167,15 @@ class Build:
 class Room:
     """The sources of a room and its tests; `slots` of changes are tried at once."""
 
-    def __init__(self, root, build, name, tests, num_slots):
+    def __init__(self, root, build, name, tests, num_slots, folder):
         self.root, self.build, self.name, self.tests = root, build, name, tests
-        self.folder = build.folder / "mutation"
+        self.folder = folder
         self.slots = queue.Queue()
         for slot in range(num_slots):
-            (self.folder / str(slot)).mkdir(parents=True, exist_ok=True)
+            (self.folder / str(slot)).mkdir()
             self.slots.put(slot)
+        for source in sources_of(root, name):
+            build.precompile(root / source, folder)
         self.time_limit_s = {}
 
     def run(self, command, time_limit_s, env=None):
@@ -181,12 +203,13 @@ class Room:
             if self.run(self.build.compile(self.root / source, changed, compiled), 600):
                 return "broken"
             for test in self.tests:
+                name, *options = test.split()
                 # Beside the programs that tests start.
-                program = self.build.folder / f"mutant_{slot}_{test}"
-                if self.run(self.build.link(test, compiled, program), 600):
+                program = self.build.folder / f"mutant_{os.getpid()}_{slot}_{name}"
+                if self.run(self.build.link(name, compiled, program), 600):
                     return "broken"
                 start = time.monotonic()
-                code = self.run([str(program), "--gtest_brief=1", "--gtest_fail_fast"], self.time_limit_s.get(test, 600),
+                code = self.run([str(program), *options, "--gtest_brief=1", "--gtest_fail_fast"], self.time_limit_s.get(test, 600),
                                 {**os.environ, "TEST_TMPDIR": str(folder)})
                 program.unlink()
                 if code:
@@ -195,6 +218,25 @@ class Room:
             return "survived"
         finally:
             self.slots.put(slot)
+
+
+def tried(room, changes, num, jobs, texts):
+    """How many of a room's changes were noticed, survived and did not compile; says which survived."""
+    counts = {"noticed": 0, "survived": 0, "broken": 0}
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        waiting, rest = {}, iter(changes)
+        while True:
+            while len(waiting) < jobs and counts["noticed"] + counts["survived"] + len(waiting) < num:
+                if (change := next(rest, None)) is None:
+                    break
+                waiting[pool.submit(room.outcome, change.file, change.applied(texts[change.file]))] = change
+            if not waiting:
+                return counts
+            for done in concurrent.futures.wait(waiting, return_when=concurrent.futures.FIRST_COMPLETED).done:
+                change, outcome = waiting.pop(done), done.result()
+                counts[outcome] += 1
+                if outcome == "survived":
+                    print(f"survived {change.said(texts[change.file])}", flush=True)
 
 
 def main():
@@ -232,27 +274,13 @@ def main():
     texts = {source: (root / source).read_text() for source in sources}
     changes = [change for source in sources for change in changes_of(source, texts[source]) if not is_listed(change, texts[source], same)]
     draw.shuffle(changes)
-    room = Room(root, Build(arguments.build.resolve()), arguments.room, entry["tests"], arguments.jobs)
-    if not changes or room.outcome(sources[0], texts[sources[0]]) != "survived":
-        print(f"{arguments.room}: {'nothing to change' if not changes else 'its tests fail as they are'}", file=sys.stderr)
-        return 2
-
-    print(f"{arguments.room}: {len(changes)} changes, {arguments.num} of them tried, seed {arguments.seed}", flush=True)
-    counts = {"noticed": 0, "survived": 0, "broken": 0}
-    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        waiting, rest = {}, iter(changes)
-        while True:
-            while len(waiting) < arguments.jobs and counts["noticed"] + counts["survived"] + len(waiting) < arguments.num:
-                if (change := next(rest, None)) is None:
-                    break
-                waiting[pool.submit(room.outcome, change.file, change.applied(texts[change.file]))] = change
-            if not waiting:
-                break
-            for done in concurrent.futures.wait(waiting, return_when=concurrent.futures.FIRST_COMPLETED).done:
-                change, outcome = waiting.pop(done), done.result()
-                counts[outcome] += 1
-                if outcome == "survived":
-                    print(f"survived {change.said(texts[change.file])}", flush=True)
+    with tempfile.TemporaryDirectory(prefix="mutation_", dir=arguments.build) as folder:
+        room = Room(root, Build(arguments.build.resolve()), arguments.room, entry["tests"], arguments.jobs, pathlib.Path(folder).resolve())
+        if not changes or room.outcome(sources[0], texts[sources[0]]) != "survived":
+            print(f"{arguments.room}: {'nothing to change' if not changes else 'its tests fail as they are'}", file=sys.stderr)
+            return 2
+        print(f"{arguments.room}: {len(changes)} changes, {arguments.num} of them tried, seed {arguments.seed}", flush=True)
+        counts = tried(room, changes, arguments.num, arguments.jobs, texts)
     num = counts["noticed"] + counts["survived"]
     print(f"{arguments.room}: {counts['noticed']} of {num} changes noticed ({100 * counts['noticed'] / max(1, num):.0f} %; {entry['noticed']} % wanted), "
           f"{counts['broken']} did not compile")
