@@ -48,20 +48,6 @@ const std::vector<Stage>& Line() {
   return line;
 }
 
-void WriteSmallRecipe(const std::string& path) {
-  std::ofstream(path) << R"(name = "small"
-[simulate]
-width_m = 5.5
-depth_m = 6
-num_rooms = 2
-spacing_m = 1
-image_width_px = 240
-image_height_px = 180
-texel_m = 0.01
-num_queries = 2
-)" << TinyStageOptions();
-}
-
 // Path relative to `folder` -> hash.  Reports hold times and .reuse files what earlier runs knew: their names
 // count only.
 using Contents = std::map<std::string, std::string>;

@@ -13,8 +13,6 @@
 #include "core/delta/map_delta.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
-#include "core/seal/key_ring.h"
-#include "core/seal/map_seal.h"
 #include "tests/end_to_end/program_run.h"
 #include "tests/end_to_end/signed_epochs.h"
 
@@ -120,33 +118,10 @@ TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
   });
 }
 
-// Two of a ring of three sign each epoch: Alice in the seal, Bob beside it.  Whatever fails, or wherever the
-// robot stops, a map that the ring trusts is in place, and the next update and the way back work.
+// Whatever fails, or wherever the robot stops, a map that the ring trusts is in place, and the next update
+// and the way back work.
 class RingFaults : public Faults {
  protected:
-  RingFaults() {
-    Run("cairn keygen " + folder_ / "bob");
-    Run("cairn keygen " + folder_ / "carol");
-    Run("cairn keys make alice=" + folder_ / "key.pub" + " bob=" + folder_ / "bob.pub" +
-        " carol=" + folder_ / "carol.pub" + " --threshold 2 -o " + folder_ / "ring");
-    for (const std::string epoch : {"1", "2", "3"})
-      Run("cairn sign " + folder_ / epoch + " --key " + folder_ / "bob" + " --add");
-    fs::rename(folder_ / "3.signatures", folder_ / "delta.signatures");
-    ring_ = ReadTrustedKeys(folder_ / "ring").value();
-    before_ = {{"map", Bytes("2")},
-               {"map.previous", Bytes("1")},
-               {"map.signatures", Bytes("1.signatures") + Bytes("2.signatures")}};
-    apply_ = "cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place --public-key " +
-             folder_ / "ring";
-    rollback_ = "cairn update rollback " + work_ + "/map --public-key " + folder_ / "ring";
-  }
-
-  // Of the map in place; 0: none that the ring trusts.
-  uint64_t TrustedEpoch(const std::string& name) const {
-    const Result<MapFile> map = MapFile::Open(work_ + "/" + name, {.public_key = ring_});
-    return map.ok() && CheckFileHash(work_ + "/" + name).ok() ? map->head().epoch : 0;
-  }
-
   // Puts the files in the work folder, and kills the program before one call after the other, for all kinds.
   void ForEachKill(const std::string& command, const std::function<void()>& check) {
     int num_kills = 0;
@@ -170,43 +145,42 @@ class RingFaults : public Faults {
     EXPECT_GT(num_kills, 10);
   }
 
-  KeyRing ring_;
-  Contents before_;
-  std::string apply_, rollback_;
+  RingEpochs ring_ = RingEpochs(folder_);
+  Contents before_ = ring_.before();
 };
 
 TEST_F(RingFaults, KilledUpdateLeavesATrustedMapAndTheNextOneWorks) {
-  ForEachKill(apply_, [&] {
-    const uint64_t epoch = TrustedEpoch("map");
+  ForEachKill(ring_.apply(), [&] {
+    const uint64_t epoch = ring_.TrustedEpoch("map");
     EXPECT_TRUE(epoch == 2 || epoch == 3) << epoch;
     // The map before is gone for no moment, though it may be that of the update that did not come about.
-    const uint64_t before = TrustedEpoch("map.previous");
+    const uint64_t before = ring_.TrustedEpoch("map.previous");
     EXPECT_TRUE(before == 1 || before == 2) << before;
     EXPECT_TRUE(epoch == 2 || before == 2);
-    const ProgramRun again = RunShell(apply_);
+    const ProgramRun again = RunShell(ring_.apply());
     EXPECT_EQ(again.exit_code, 0) << again.err;
-    EXPECT_EQ(TrustedEpoch("map"), 3U);
-    EXPECT_EQ(TrustedEpoch("map.previous"), 2U);
+    EXPECT_EQ(ring_.TrustedEpoch("map"), 3U);
+    EXPECT_EQ(ring_.TrustedEpoch("map.previous"), 2U);
     EXPECT_EQ(Work().size(), 3U);  // nothing temporary stays
-    EXPECT_EQ(RunShell(rollback_).exit_code, 0);
-    EXPECT_EQ(TrustedEpoch("map"), 2U);
-    EXPECT_EQ(TrustedEpoch("map.previous"), 3U);
+    EXPECT_EQ(RunShell(ring_.rollback()).exit_code, 0);
+    EXPECT_EQ(ring_.TrustedEpoch("map"), 2U);
+    EXPECT_EQ(ring_.TrustedEpoch("map.previous"), 3U);
   });
 }
 
 TEST_F(RingFaults, KilledRollbackLeavesBothMapsTrusted) {
-  ForEachKill(rollback_, [&] {
-    const uint64_t epoch = TrustedEpoch("map");
+  ForEachKill(ring_.rollback(), [&] {
+    const uint64_t epoch = ring_.TrustedEpoch("map");
     EXPECT_TRUE(epoch == 1 || epoch == 2) << epoch;
-    EXPECT_EQ(TrustedEpoch("map.previous"), 3 - epoch);
+    EXPECT_EQ(ring_.TrustedEpoch("map.previous"), 3 - epoch);
   });
 }
 
 TEST_F(RingFaults, FailedUpdateLeavesATrustedMapAndTheRightOneBefore) {
-  ForEachFault(apply_, before_, [&](const ProgramRun& run, const Contents& after) {
-    const uint64_t epoch = TrustedEpoch("map");
+  ForEachFault(ring_.apply(), before_, [&](const ProgramRun& run, const Contents& after) {
+    const uint64_t epoch = ring_.TrustedEpoch("map");
     EXPECT_TRUE(epoch == 3 || (epoch == 2 && run.exit_code != 0)) << epoch;
-    EXPECT_EQ(TrustedEpoch("map.previous"), epoch - 1);
+    EXPECT_EQ(ring_.TrustedEpoch("map.previous"), epoch - 1);
     EXPECT_EQ(after.size(), 3U);
     if (epoch == 3 && run.exit_code != 0) {
       EXPECT_THAT(run.err, HasSubstr("is in place; but"));

@@ -70,6 +70,20 @@ num_queries = 6
                       << more;
 }
 
+void WriteSmallRecipe(const std::string& path) {
+  std::ofstream(path) << R"(name = "small"
+[simulate]
+width_m = 5.5
+depth_m = 6
+num_rooms = 2
+spacing_m = 1
+image_width_px = 240
+image_height_px = 180
+texel_m = 0.01
+num_queries = 2
+)" << TinyStageOptions();
+}
+
 void WriteCaptureRecipe(const std::string& path, const std::vector<std::string>& captures) {
   std::ofstream recipe(path);
   recipe << "name = \"tiny\"\n";

@@ -36,6 +36,9 @@ void WriteTinyRecipe(const std::string& path, const std::string& more = "");
 // The part of WriteTinyRecipe that follows [simulate]: options that suit so small a survey.
 std::string TinyStageOptions();
 
+// The same of a building that is half as large, in smaller images.
+void WriteSmallRecipe(const std::string& path);
+
 // Writes a recipe with TinyStageOptions for captures that exist; their paths may be relative to the recipe's.
 void WriteCaptureRecipe(const std::string& path, const std::vector<std::string>& captures);
 

@@ -10,6 +10,9 @@
 #include <gtest/gtest.h>
 
 #include "core/files/file.h"
+#include "core/map/map_file.h"
+#include "core/seal/key_ring.h"
+#include "core/seal/map_seal.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {
@@ -69,6 +72,51 @@ class SignedEpochs : public testing::Test {
 
   TemporaryFolder folder_;
   std::string work_;
+};
+
+// Two of a ring of three sign each epoch: Alice in the seal, Bob beside it; a robot has the second epoch in
+// place and the first one before it.
+class RingEpochs {
+ public:
+  // `folder`: of SignedEpochs; the delta gets signatures.
+  explicit RingEpochs(const TemporaryFolder& folder) : work_(folder / "work") {
+    const auto run = [](const std::string& command) {
+      const ProgramRun done = RunShell(command);
+      EXPECT_EQ(done.exit_code, 0) << command << ": " << done.err;
+    };
+    run("cairn keygen " + folder / "bob");
+    run("cairn keygen " + folder / "carol");
+    run("cairn keys make alice=" + folder / "key.pub" + " bob=" + folder / "bob.pub" +
+        " carol=" + folder / "carol.pub" + " --threshold 2 -o " + folder / "ring");
+    for (const std::string epoch : {"1", "2", "3"})
+      run("cairn sign " + folder / epoch + " --key " + folder / "bob" + " --add");
+    std::filesystem::rename(folder / "3.signatures", folder / "delta.signatures");
+    ring_ = ReadTrustedKeys(folder / "ring").value();
+    const auto bytes = [&](const std::string& name) { return ReadFile(folder / name).value(); };
+    before_ = {{"map", bytes("2")},
+               {"map.previous", bytes("1")},
+               {"map.signatures", bytes("1.signatures") + bytes("2.signatures")}};
+    apply_ = "cairn update apply " + work_ + "/map " + folder / "delta" + " --in-place --public-key " +
+             folder / "ring";
+    rollback_ = "cairn update rollback " + work_ + "/map --public-key " + folder / "ring";
+  }
+
+  // What the robot has before an update, and the commands for it.
+  const Contents& before() const { return before_; }
+  const std::string& apply() const { return apply_; }
+  const std::string& rollback() const { return rollback_; }
+
+  // Of a map of the robot; 0: none that the ring trusts.
+  uint64_t TrustedEpoch(const std::string& name) const {
+    const Result<MapFile> map = MapFile::Open(work_ + "/" + name, {.public_key = ring_});
+    return map.ok() && CheckFileHash(work_ + "/" + name).ok() ? map->head().epoch : 0;
+  }
+
+ private:
+  std::string work_;
+  KeyRing ring_;
+  Contents before_;
+  std::string apply_, rollback_;
 };
 
 }  // namespace cairn
