@@ -217,8 +217,9 @@ Result<std::shared_ptr<const VisualMap::Models>> VisualMap::MakeModels(
       return MakeError(ErrorCode::kCorrupt, "the {} sights of landmark {} do not determine a model",
                        sights.size(), landmark);
     }
-    Model& model = models->emplace_back(landmark, of_heading.heading, std::move(*interpolation),
-                                        of_heading.sigma, of_heading.predicts_badly);
+    models->push_back({landmark, of_heading.heading, std::move(*interpolation), of_heading.sigma,
+                       of_heading.predicts_badly});
+    Model& model = models->back();
     for (const Sight& sight : sights) model.sight_places.push_back(sight.place);
     FillExtent(&model);
   }

@@ -37,8 +37,8 @@ Result<ColmapModel> ModelFromClasses(const Classes& classes, const ImageKeypoint
   std::unordered_map<ImageId, ModelImage*> image_of;
   model.images.reserve(classes.images.size());
   for (const SurveyImage& image : classes.images) {
-    ModelImage& exported =
-        model.images.emplace_back(image.image_id, image.name, image.camera_id, image.cam_from_world);
+    model.images.push_back({image.image_id, image.name, image.camera_id, image.cam_from_world});
+    ModelImage& exported = model.images.back();
     image_of.emplace(image.image_id, &exported);
     if (keypoints == nullptr || !keypoints->contains(image.image_id)) continue;
     for (const Keypoint& keypoint : keypoints->at(image.image_id))

@@ -140,7 +140,7 @@ std::vector<OtherPlace> OtherPlaces(int piece1, int piece2, const Turns& turns, 
     std::vector<Relation> tried;
     for (const auto& [num, shift] : shifts) {
       if (tried.size() >= kMaxNumShifts) break;
-      const auto is_near = [&](const Relation& other) {
+      const auto is_near = [&, &shift = shift](const Relation& other) {
         return (other.translation() - shift.translation()).norm() < kSameShift * tolerance;
       };
       if (std::any_of(tried.begin(), tried.end(), is_near)) continue;

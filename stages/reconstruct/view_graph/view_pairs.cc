@@ -63,7 +63,9 @@ std::vector<Pose> RelativePosesOf(const TwoViewGeometry& geometry, const Camera&
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [cost, pose] : found) {
-    const auto is_same = [&](const Pose& other) { return RotationErrorDeg(pose, other) < kSameRotationDeg; };
+    const auto is_same = [&pose = pose](const Pose& other) {
+      return RotationErrorDeg(pose, other) < kSameRotationDeg;
+    };
     if (cost <= kAsGoodRatio * least && std::none_of(poses.begin(), poses.end(), is_same))
       poses.push_back(pose);
   }
