@@ -203,8 +203,10 @@ Status CheckMapHead(const MapHead& head) {
       return Invalid("camera {} is out of order", head.cameras[i].camera_id);
     }
   }
-  if (!IsPose(head.floor_from_world) || !IsPose(head.camera_from_given))
-    return Invalid("the rotation of a frame is not valid");
+  for (const Pose& frame : {head.floor_from_world, head.camera_from_given}) {
+    if (!IsPose(frame) || frame.translation.cwiseAbs().maxCoeff() > kMaxExtentM)
+      return Invalid("the rotation of a frame, or its place, is not valid");
+  }
   if (!(head.stated_pose_sigma_m >= 0 && head.stated_pose_sigma_m < 1e3) ||
       !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
     return Invalid("the noise of the stated poses is not a valid number");

@@ -131,6 +131,7 @@ Result<SQLite::Database> OpenColmapDatabase(const std::string& path) {
   Result<SQLite::Database> result = WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
     try {
       SQLite::Database database = OpenUnchanged(path);
+      LimitSteps(database, NumBytes(path) + NumBytes(path + "-wal"));
       CAIRN_RETURN_IF_ERROR(CheckSchema(database, path));
       return database;
     } catch (const fs::filesystem_error& error) {

@@ -243,6 +243,8 @@ Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_
   std::string prefix = UnlinkPages(old_bytes, delta.old_page_size, delta.has_rows);
   std::string_view frame = delta.payload;
   if (delta.has_rows) {
+    if (std::max(delta.old_num_bytes, delta.new_num_bytes) > static_cast<uint64_t>(MapDelta::kMaxRowMapBytes))
+      return Corrupt(delta_path, "states rows of a map that is too large for them");
     CAIRN_ASSIGN_OR_RETURN(const MapRows old_rows, ReadMapRows(old_path));
     BlobReader reader(delta.payload);
     const std::string_view row_delta = reader.Bytes(reader.UInt32());

@@ -48,6 +48,12 @@ Result<std::string> CompressAfter(std::string_view prefix, std::string_view byte
 
 Result<std::string> DecompressAfter(std::string_view prefix, std::string_view frame, size_t num_bytes,
                                     const std::string& what) {
+  // Before memory for it is asked for.
+  if (const unsigned long long stated = ZSTD_getFrameContentSize(frame.data(), frame.size());
+      stated != num_bytes) {
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload is no frame of the {} bytes that its head states",
+                     what, num_bytes);
+  }
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax,
                          ZSTD_dParam_getBounds(ZSTD_d_windowLogMax).upperBound);

@@ -78,9 +78,23 @@ void Harden(SQLite::Database& database, uint64_t num_bytes) {
 void LimitSteps(SQLite::Database& database, uint64_t num_bytes) {
   // A row takes five bytes or more, and about one step for each of its values.
   const uint64_t max_num_steps = 10'000'000 + 16 * num_bytes;
-  if (max_num_steps > INT_MAX) return;  // SQLite counts no further: above 134 MB there is no limit
-  sqlite3_progress_handler(
-      database.getHandle(), static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
+  sqlite3* const handle = database.getHandle();
+  if (max_num_steps <= INT_MAX) {
+    sqlite3_progress_handler(
+        handle, static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
+    return;
+  }
+  // SQLite counts no further; a file with a hole in it may be as large as it likes.  All statements of the
+  // connection count together then, and none reads a file more than a few times.  A function that nobody
+  // calls keeps the count for as long as the connection lives.
+  auto* const num_left =
+      new int64_t(static_cast<int64_t>(std::min<uint64_t>(max_num_steps, INT64_MAX / 16)) * 8);
+  const int code = sqlite3_create_function_v2(
+      handle, "cairn_steps_left", 0, SQLITE_UTF8, num_left,
+      [](sqlite3_context* context, int, sqlite3_value**) { sqlite3_result_null(context); }, nullptr, nullptr,
+      [](void* count) { delete static_cast<int64_t*>(count); });
+  if (code == SQLITE_OK)
+    sqlite3_progress_handler(handle, kStepsPerLook, CountDown, num_left);  // else it is deleted
 }
 
 StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)

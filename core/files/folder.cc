@@ -112,8 +112,8 @@ Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
   while (target.size() > 1 && target.back() == '/') target.pop_back();
   RemoveLeftovers(target, kind);
   CAIRN_RETURN_IF_ERROR(CheckTarget(target, kind));
-  const std::string temporary = TemporaryPath(target);
-  RemoveOwnFolder(temporary);  // of an earlier process with this number
+  // Processes in two containers may have one number.
+  const std::string temporary = RandomTemporaryPath(target);
   std::error_code error;
   if (!fs::create_directory(temporary, error)) {
     return WriteError(temporary, "cannot be created", error ? error.value() : EEXIST);

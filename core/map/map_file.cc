@@ -137,6 +137,12 @@ Status MapFile::ReadHead(SQLite::Database& database, const MapFileOptions& optio
   Result<MapDirectory> directory = MapDirectory::Decode(entries, num_bytes_);
   if (!directory.ok()) return Corrupt(path_, "{}", directory.error().message);
   directory_ = std::move(*directory);
+  // Packed, a thousand landmarks that are alike take few bytes; a robot reads all of them where nothing else
+  // helps.
+  constexpr int64_t kLandmarkBytes = sizeof(MapLandmark) + 128;
+  if (directory_.Count(BlockKind::kLandmarks) > MaxRowBytes(num_bytes_) / kLandmarkBytes)
+    return Corrupt(path_, "{} landmarks, more than a map of {} bytes has",
+                   directory_.Count(BlockKind::kLandmarks), num_bytes_);
   directory_.set_descriptor_kind(head_.descriptor_kind);
   return Ok();
 }

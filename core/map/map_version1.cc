@@ -39,7 +39,8 @@ Status ReadImages(SQLite::Database& database, const std::string& path, MapRows* 
 }
 
 Status ReadStations(SQLite::Database& database, const std::string& path, MapRows* rows) {
-  const int64_t num_stations = database.execAndGet("SELECT count(*) FROM stations").getInt64();
+  const int64_t num_stations =
+      database.execAndGet("SELECT count(*) FROM stations WHERE station_idx >= 0").getInt64();
   SQLite::Statement query(
       database,
       "SELECT station_idx, x, y, heading_deg, is_covered, num_neighbours, neighbours FROM stations "
@@ -89,7 +90,8 @@ Status ReadRegions(SQLite::Database& database, const std::string& path, MapRows*
 }
 
 Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRows* rows) {
-  const int64_t num_landmarks = database.execAndGet("SELECT count(*) FROM landmarks").getInt64();
+  const int64_t num_landmarks =
+      database.execAndGet("SELECT count(*) FROM landmarks WHERE landmark_idx >= 0").getInt64();
   if (num_landmarks > INT32_MAX) return Corrupt(path, "{} landmarks", num_landmarks);
   rows->landmarks.reserve(num_landmarks);
   rows->descriptors.resize(num_landmarks, kSiftDescriptorDim);

@@ -31,6 +31,31 @@ std::string TextFromToml(const toml::node& node) {
   return text.str();
 }
 
+// toml++ takes a key's parts, and what they lead to, one inside the other, without a limit of its own.
+constexpr int kMaxPartsOfAKey = 100;
+
+// Of dotted keys and headers of tables, wherever they may stand; numbers have one dot.
+int MostPartsOfAKey(const std::string& contents) {
+  int num = 1, most = 1;
+  char quote = 0;  // of the string that this is in
+  for (size_t i = 0; i < contents.size(); ++i) {
+    const char c = contents[i];
+    if (quote != 0) {
+      if (c == '\\' && quote == '"') ++i;
+      if (c == quote || c == '\n') quote = 0;  // lines of a longer string count as if they were keys
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '#') {
+      i = std::min(contents.find('\n', i), contents.size()) - 1;
+    } else if (c == '.') {
+      most = std::max(most, ++num);
+    } else if (c == '=' || c == ',' || c == '\n' || c == '{' || c == '[') {
+      num = 1;
+    }
+  }
+  return most;
+}
+
 }  // namespace
 
 Result<toml::table> ReadTomlFile(const std::string& path) {
@@ -39,6 +64,9 @@ Result<toml::table> ReadTomlFile(const std::string& path) {
 }
 
 Result<toml::table> ParseToml(const std::string& contents, const std::string& path) {
+  if (MostPartsOfAKey(contents) > kMaxPartsOfAKey)
+    return MakeError(ErrorCode::kCorrupt, "{}: not TOML for cairn: a key of more than {} parts", path,
+                     kMaxPartsOfAKey);
   try {
     return toml::table(toml::parse(contents, path));
   } catch (const toml::parse_error& error) {

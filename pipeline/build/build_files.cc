@@ -6,10 +6,12 @@
 #include <regex>
 #include <set>
 
+#include "core/files/file.h"
 #include "core/files/folder_manifest.h"
 #include "core/files/temporary.h"
 #include "pipeline/build/build_folder.h"
 #include "pipeline/build/line.h"
+#include "stages/extract_features/dependency_file.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -48,6 +50,17 @@ bool IsOptionsFileName(const std::string& name) {
 }
 
 Status CheckBuildFolder(const std::string& build_dir) {
+  // Make reads it.
+  const std::string dependencies = build_dir + "/images.d";
+  std::error_code no_file;
+  if (fs::exists(fs::symlink_status(dependencies, no_file))) {
+    const Result<std::string> text = ReadFile(dependencies);
+    if (!text.ok() || !extract_features::IsDependencyFile(*text)) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: is not as extract-features writes it, and make would do what it says; remove it",
+                       dependencies);
+    }
+  }
   if (!ConfiguredRecipe(build_dir).empty()) return Ok();
   std::set<std::string> theirs;
   std::error_code error;

@@ -332,6 +332,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   }
 
   const std::string options = paths.build_dir + "/options";
+  if (std::error_code error; fs::is_symlink(options, error))
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is a link, and cairn writes files there; remove it",
+                     options);
   CAIRN_RETURN_IF_ERROR(CreateFolder(options));
   for (const StageOptions& stage : recipe.stages) {
     CAIRN_RETURN_IF_ERROR(

@@ -70,7 +70,7 @@ Result<FileLock> OpenLockFile(const std::string& build_dir) {
   if (error)
     return MakeError(ErrorCode::kIo, "{}: the folder cannot be made: {}", build_dir, error.message());
   const std::string path = build_dir + kLockFile;
-  const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0666);
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
   return FileLock(fd);
 }

@@ -7,6 +7,8 @@
 #include <optional>
 #include <set>
 
+#include "core/files/database.h"
+#include "core/files/file.h"
 #include "core/files/folder_manifest.h"
 #include "pipeline/build/build_files.h"
 #include "pipeline/build/build_folder.h"
@@ -120,6 +122,13 @@ std::vector<std::string> BuildFoldersOf(const std::string& recipe) {
   return {found.begin(), found.end()};
 }
 
+// Whether a file is a map of cairn's, by its name and what SQLite has at its byte 68.
+bool IsMap(const fs::path& path) {
+  std::error_code error;
+  return path.extension() == ".cairn" && fs::is_regular_file(fs::symlink_status(path, error)) &&
+         IsSqliteFile(path.string()) && ReadHead(path.string(), 72).ends_with("crmp");
+}
+
 Status CleanBuildFolder(const std::string& build_dir, const fs::path& map, const CleanArguments& arguments,
                         std::ostream& out) {
   std::error_code error;
@@ -133,10 +142,13 @@ Status CleanBuildFolder(const std::string& build_dir, const fs::path& map, const
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: has no config.mk: not a build folder of cairn; nothing was removed", build_dir);
   }
-  if (arguments.all && !map.empty()) {
-    for (const fs::path& path : {map, fs::path(ReportPath(map.string()))}) {
-      if (fs::is_regular_file(path, error)) removal.files.push_back(path);
-    }
+  // What a file of the folder names may be anything.
+  if (arguments.all && IsMap(map)) {
+    removal.files.push_back(map);
+    const fs::path report = ReportPath(map.string());
+    if (fs::is_regular_file(fs::symlink_status(report, error))) removal.files.push_back(report);
+  } else if (arguments.all && !map.empty() && fs::exists(fs::symlink_status(map, error))) {
+    removal.kept.push_back(map);
   }
   out << RemovalText(removal, build_dir, arguments.dry_run ? "would remove" : "removed");
   return arguments.dry_run ? Ok() : Remove(removal);

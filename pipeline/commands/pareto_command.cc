@@ -144,8 +144,10 @@ Result<ParetoPoint> ReadPoint(const Places& places, int64_t size) {
                     .num_held_out = json["num_held_out"].get<int>(),
                     .localized_ratio = json["localized_ratio"].get<double>(),
                     .within_10cm_5deg_ratio = json["within_10cm_5deg_ratio"].get<double>()};
-  if (const auto options = rows.stage_options.find("emit_map"); options != rows.stage_options.end())
-    point.descriptor_bits = toml::parse(options->second)["descriptor_bits"].value_or(0);
+  if (const auto options = rows.stage_options.find("emit_map"); options != rows.stage_options.end()) {
+    CAIRN_ASSIGN_OR_RETURN(const toml::table keys, ParseToml(options->second, map));
+    point.descriptor_bits = keys["descriptor_bits"].value_or(0);
+  }
   if (json.contains("precision_ratio")) point.precision_ratio = json["precision_ratio"].get<double>();
   if (json.contains("median_error_m")) {
     point.median_error_m = json["median_error_m"].get<double>();

@@ -8,6 +8,7 @@
 #include <toml++/toml.h>
 #include <nlohmann/json.hpp>
 
+#include "core/options/toml_options.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/place_changes.h"
 #include "pipeline/explain/station_text.h"
@@ -19,14 +20,15 @@ namespace {
 std::map<std::string, std::string> FlatOptions(const MapRows& rows) {
   std::map<std::string, std::string> flat;
   for (const auto& [stage, text] : rows.stage_options) {
-    try {
-      for (const auto& [key, value] : toml::parse(text)) {
-        std::ostringstream printed;
-        value.visit([&](const auto& node) { printed << node; });
-        flat[fmt::format("[{}] {}", stage, key.str())] = printed.str();
-      }
-    } catch (const toml::parse_error&) {
+    const Result<toml::table> options = ParseToml(text, stage);
+    if (!options.ok()) {
       flat[fmt::format("[{}]", stage)] = text;  // of a program that wrote it otherwise
+      continue;
+    }
+    for (const auto& [key, value] : *options) {
+      std::ostringstream printed;
+      value.visit([&](const auto& node) { printed << node; });
+      flat[fmt::format("[{}] {}", stage, key.str())] = printed.str();
     }
   }
   return flat;

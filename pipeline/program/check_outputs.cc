@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <set>
 
 #include "core/capture/capture_frame.h"
 #include "core/files/output_path.h"
 #include "core/images/image_file.h"
+#include "core/seal/signature_list.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -71,11 +73,13 @@ Status CheckOutput(const Output& written, const std::string& input) {
 Status CheckOutputs(const CLI::App& command, const std::vector<std::string>& may_be_output) {
   std::vector<std::string> inputs;
   std::vector<Output> outputs;
+  std::set<std::string> given_signatures;  // which may be those of the output already
   for (const CLI::Option* option : command.get_options()) {
     const std::vector<std::string> paths = PathsOf(*option);
     if (HasAnyName(*option, kOutputs)) {
       for (const std::string& path : paths) outputs.push_back({path, option->check_name("--output")});
     } else if (!HasAnyName(*option, may_be_output)) {
+      if (option->check_name("--signatures")) given_signatures.insert(paths.begin(), paths.end());
       inputs.insert(inputs.end(), paths.begin(), paths.end());
     }
   }
@@ -85,6 +89,23 @@ Status CheckOutputs(const CLI::App& command, const std::vector<std::string>& may
         return MakeError(ErrorCode::kInvalidArgument,
                          "{}: two different files cannot be written there; choose another name for one",
                          outputs[i].path);
+      }
+    }
+  }
+  // Signatures are read and written beside what they sign.
+  for (const Output& output : outputs) {
+    for (const std::string& input : inputs) {
+      if (IsSameFile(output.path, SignaturesPath(input))) {
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "{}: are the signatures of the input {} and cannot be the output; choose another name",
+            output.path, input);
+      }
+      if (IsSameFile(SignaturesPath(output.path), input) && !given_signatures.contains(input)) {
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "{}: is an input, and where the signatures of the output {} are; choose another name", input,
+            output.path);
       }
     }
   }

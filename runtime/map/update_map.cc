@@ -114,7 +114,8 @@ Result<NextMap> WriteMap(const std::string& bytes, const std::string& path, cons
 //   now, so that to go back is one exchange.
 // Signatures of other maps prove nothing about the one in place: a reader passes over them.  A reader that
 // has opened the map just before it was renamed finds its signatures afterwards, too.
-Status KeepSignatures(const Seal& next, const SignatureList& candidates, const std::string& map_path) {
+Status KeepSignatures(const Seal& next, const SignatureList& candidates, const std::string& map_path,
+                      const std::optional<KeyRing>& trusted) {
   const std::string path = SignaturesPath(map_path);
   CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesAt(path));
   SignatureList kept = ValidSignatures(SignedBytesOf(next), Union(candidates, beside));
@@ -123,6 +124,10 @@ Status KeepSignatures(const Seal& next, const SignatureList& candidates, const s
     const Result<Seal> seal = ReadSeal(there);
     if (!seal.ok() && seal.error().code == ErrorCode::kIo) return seal.error();
     if (seal.ok()) kept = Union(std::move(kept), ValidSignatures(SignedBytesOf(*seal), beside));
+  }
+  if (kept.size() > kMaxSignatures && trusted) {
+    // Whoever has a delivery in his hands can sign it, too; what nobody trusts must not be in the way.
+    std::erase_if(kept, [&](const KeySignature& each) { return trusted->Find(each.public_key) == nullptr; });
   }
   if (kept.size() > kMaxSignatures) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -246,7 +251,7 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
     CAIRN_ASSIGN_OR_RETURN(NextMap next, WriteMap(bytes, new_path, old_path, delta_path, given, options));
     CAIRN_ASSIGN_OR_RETURN(const SignatureList beside, SignaturesBeside(old_path));
-    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, Union(given, beside), new_path));
+    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, Union(given, beside), new_path, options.public_key));
     return next.file.Finish();
   });
 }
@@ -267,13 +272,13 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
           const MapFile map,
           MapFile::Open(map_path, {.public_key = options.public_key, .signatures = Union(given, beside)}));
       CAIRN_RETURN_IF_ERROR(CheckAskedFor(map.head(), map_path, options.name, options.min_epoch));
-      CAIRN_RETURN_IF_ERROR(KeepSignatures(map.seal(), given, map_path));
+      CAIRN_RETURN_IF_ERROR(KeepSignatures(map.seal(), given, map_path, options.public_key));
       CAIRN_RETURN_IF_ERROR(SyncFolderOf(map_path, lock.descriptor()));
       return false;
     }
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, map_path, delta_path));
     CAIRN_ASSIGN_OR_RETURN(NextMap next, WriteMap(bytes, map_path, map_path, delta_path, given, options));
-    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, given, map_path));
+    CAIRN_RETURN_IF_ERROR(KeepSignatures(next.seal, given, map_path, options.public_key));
     KeptMap previous(map_path, lock.descriptor());
     CAIRN_RETURN_IF_ERROR(previous.Keep());
     const Status status = next.file.Finish();

@@ -187,7 +187,8 @@ Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& opti
 }  // namespace
 
 bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options) {
-  return result.error_m > options.gross_error_m || result.error_deg > options.gross_error_deg;
+  return !(result.error_m <= options.gross_error_m &&
+           result.error_deg <= options.gross_error_deg);  // nor NaN
 }
 
 OptionTable DescribeOptions(CheckMapOptions* o) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cairn::extract_features {
@@ -11,6 +12,10 @@ namespace cairn::extract_features {
 // at the end) are left out.  Paths are written as they are given; absolute ones let the fragment be read from
 // any folder.
 std::string DependencyFile(const std::vector<std::string>& inputs, const std::vector<std::string>& roots);
+
+// Whether DependencyFile writes exactly this for some inputs and roots: Make does no more with it than to set
+// the variable, whoever has put it there.
+bool IsDependencyFile(std::string_view text);
 
 // Every folder between `root` and the files, the root first, then ascending: adding or removing a file
 // changes the date of its folder.  Files that do not lie below the root are skipped.
