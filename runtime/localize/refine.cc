@@ -377,6 +377,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurem
 }
 
 double LargestSigma(const Eigen::Matrix3d& covariance) {
+  if (!covariance.allFinite()) return std::numeric_limits<double>::infinity();
   return std::sqrt(
       std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
 }

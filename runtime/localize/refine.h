@@ -50,7 +50,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurem
                                                     const std::optional<UpMeasurement>& up = std::nullopt,
                                                     WorkBudget* work = nullptr);
 
-// Of a covariance's worst direction.
+// Of a covariance's worst direction; infinite where it is not a number.
 double LargestSigma(const Eigen::Matrix3d& covariance);
 
 // Covariance of b_from_world for b_from_cam * cam_from_world: Ad C Ad'.

@@ -1,6 +1,7 @@
 #include "runtime/localize/estimate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include <gtest/gtest.h>
@@ -125,6 +126,72 @@ TEST(EstimatePoses, NotOfFarFewerMatches) {
   }
   for (const PoseEstimate& pose : EstimatePoses(measurements, 4, {}, {}, 0))
     EXPECT_LT(CenterErrorM(pose.cam_from_world, kTruth), 0.2) << pose.inliers.size();
+}
+
+// Of half of them inliers, one of log 0.01 / log(1 - 0.5^3) = 34.5 samples has them alone, with a confidence
+// of 0.99.
+TEST(Estimate, AsManySamplesAsTheConfidenceAsksFor) {
+  EstimateOptions options{
+      .confidence = 0.99, .min_num_ransac_iterations = 10, .max_num_ransac_iterations = 1000};
+  const auto measurements = MakeScene(100, 100, 2);
+  const auto estimate = EstimatePose(measurements, options, {}, 3);
+  ASSERT_TRUE(estimate);
+  const double good = std::pow(static_cast<double>(estimate->inliers.size()) / 200, 3);
+  ASSERT_NEAR(good, 0.125, 0.02);  // an outlier may agree by chance
+  EXPECT_EQ(estimate->num_iterations, static_cast<int>(std::log(0.01) / std::log1p(-good)));
+  options.min_num_ransac_iterations = 50;
+  EXPECT_EQ(EstimatePose(measurements, options, {}, 3)->num_iterations, 50);
+  options = {.confidence = 0.99, .min_num_ransac_iterations = 10, .max_num_ransac_iterations = 20};
+  EXPECT_EQ(EstimatePose(measurements, options, {}, 3)->num_iterations, 20);
+}
+
+// As many samples of two where up is known, of which a quarter has inliers alone: log 0.01 / log 0.75 = 16.
+TEST(Estimate, FewerSamplesOfTwo) {
+  const EstimateOptions options{
+      .confidence = 0.99, .min_num_ransac_iterations = 5, .max_num_ransac_iterations = 1000};
+  const UpMeasurement up{kTruth.rotation * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ(), 1e-3};
+  const auto measurements = MakeScene(100, 100, 2);
+  const auto estimate = EstimatePose(measurements, options, {}, 3, up);
+  ASSERT_TRUE(estimate);
+  const double good = std::pow(static_cast<double>(estimate->inliers.size()) / 200, 2);
+  ASSERT_NEAR(good, 0.25, 0.03);
+  EXPECT_EQ(estimate->num_iterations, static_cast<int>(std::log(0.01) / std::log1p(-good)));
+  EXPECT_LT(CenterErrorM(estimate->cam_from_world, kTruth), 0.05);
+}
+
+// Two samples count as one of two and one of three where up errs by one to three times what an inlier may:
+// twice as many.
+TEST(Estimate, TwiceAsManySamplesWhereEveryOtherIsOfThree) {
+  EstimateOptions options{.max_error_px = 6,
+                          .confidence = 0.99,
+                          .min_num_ransac_iterations = 5,
+                          .max_num_ransac_iterations = 1000};
+  // 500 px x 0.02 rad = 10 px
+  const UpMeasurement up{kTruth.rotation * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ(), 0.02};
+  const auto measurements = MakeScene(100, 100, 2);
+  EXPECT_FALSE(UsesTwoPoints(measurements, up, options));
+  const auto estimate = EstimatePose(measurements, options, {}, 3, up);
+  ASSERT_TRUE(estimate);
+  const double good = std::pow(static_cast<double>(estimate->inliers.size()) / 200, 2);
+  EXPECT_EQ(estimate->num_iterations, 2 * static_cast<int>(std::log(0.01) / std::log1p(-good)));
+  options.max_num_ransac_iterations = 12;
+  EXPECT_EQ(EstimatePose(measurements, options, {}, 3, up)->num_iterations, 12);
+  // Beyond three times, all are of three: 500 x 0.04 > 18.
+  options.max_num_ransac_iterations = 1000;
+  const UpMeasurement rough{up.in_rig, up.in_world, 0.04};
+  const auto of_three = EstimatePose(measurements, options, {}, 3, rough);
+  ASSERT_TRUE(of_three);
+  const double good_of_three = std::pow(static_cast<double>(of_three->inliers.size()) / 200, 3);
+  EXPECT_EQ(of_three->num_iterations, static_cast<int>(std::log(0.01) / std::log1p(-good_of_three)));
+}
+
+TEST(UsesTwoPoints, WhereUpErrsByNoMoreThanAnInlierMay) {
+  const auto measurements = MakeScene(1, 0, 1);  // 500 px per rad
+  const UpMeasurement up{Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ(), 0.0125};
+  EXPECT_TRUE(UsesTwoPoints(measurements, up, {.max_error_px = 6.25}));
+  EXPECT_FALSE(UsesTwoPoints(measurements, up, {.max_error_px = 6.24}));
+  EXPECT_FALSE(UsesTwoPoints(measurements, std::nullopt, {}));
+  EXPECT_FALSE(UsesTwoPoints({}, up, {}));
 }
 
 TEST(Estimate, EqualPointsGiveNothingOrAPoseThatFitsThem) {
