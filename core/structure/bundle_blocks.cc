@@ -8,7 +8,6 @@
 extern "C" void omp_set_max_active_levels(int max_levels);
 
 namespace cairn {
-namespace {}  // namespace
 
 void StorePose(const Pose& pose, double* block) {
   Eigen::Map<Eigen::Vector4d> rotation(block);

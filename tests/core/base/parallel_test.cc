@@ -1,7 +1,14 @@
 #include "core/base/parallel.h"
 
+#include <sched.h>
+
+#include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -49,6 +56,46 @@ TEST(Parallel, AnExceptionIsThrownWhereItWasCalled) {
                              }),
                  std::runtime_error);
   }
+}
+
+TEST(Parallel, SoManyThreadsAreAtWorkAsWasSaidAndNoMoreThanItems) {
+  EXPECT_EQ(NumThreads(7), 7);
+  EXPECT_EQ(NumThreads(1), 1);
+  EXPECT_GE(NumThreads(0), 1);
+  EXPECT_EQ(NumThreads(-3), NumThreads(0));
+  cpu_set_t allowed;
+  ASSERT_EQ(sched_getaffinity(0, sizeof(allowed), &allowed), 0);
+  EXPECT_EQ(NumThreads(0), CPU_COUNT(&allowed));
+  // Each item waits until all threads have one; not for ever.
+  for (const int num_threads : {1, 2, 4}) {
+    for (const int num_items : {4, 2}) {
+      const int expected = std::min(num_threads, num_items);
+      std::mutex mutex;
+      std::set<std::thread::id> threads;
+      std::atomic<int> num_at_work = 0;
+      ParallelFor(num_items, num_threads, [&](int64_t) {
+        {
+          const std::lock_guard<std::mutex> lock(mutex);
+          if (threads.insert(std::this_thread::get_id()).second) ++num_at_work;
+        }
+        for (int i = 0; i < 2000 && num_at_work < expected; ++i)
+          std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      });
+      EXPECT_EQ(std::ssize(threads), expected);
+      EXPECT_TRUE(threads.contains(std::this_thread::get_id()));
+    }
+  }
+}
+
+TEST(Parallel, AfterAnExceptionNoItemIsBegun) {
+  std::atomic<int> num_begun = 0;
+  EXPECT_THROW(ParallelFor(1000, 2,
+                           [&](int64_t) {
+                             ++num_begun;
+                             throw std::runtime_error("each");
+                           }),
+               std::runtime_error);
+  EXPECT_LE(num_begun, 2);
 }
 
 }  // namespace

@@ -1,5 +1,9 @@
 #include "core/base/printable.h"
 
+#include <cstdint>
+#include <string>
+#include <string_view>
+
 #include <gtest/gtest.h>
 
 namespace cairn {
@@ -49,6 +53,32 @@ TEST(Printable, ControlCharactersOfNamesAreSeen) {
   EXPECT_FALSE(HasControlCharacter(""));
   for (const char c : {'\0', '\n', '\r', '\t', '\x1b', '\x1f', '\x7f'})
     EXPECT_TRUE(HasControlCharacter(std::string("a") + c + "b")) << int{c};
+}
+
+TEST(FirstCharacter, IsTheFirstAndTheLastOfEachLength) {
+  struct Character {
+    std::string_view bytes;
+    char32_t code;
+  };
+  for (const Character& character :
+       {Character{std::string_view("\0", 1), 0}, Character{"\x7f", 0x7f}, Character{"\xc2\x80", 0x80},
+        Character{"\xdf\xbf", 0x7ff}, Character{"\xe0\xa0\x80", 0x800}, Character{"\xed\x9f\xbf", 0xd7ff},
+        Character{"\xee\x80\x80", 0xe000}, Character{"\xef\xbf\xbf", 0xffff},
+        Character{"\xf0\x90\x80\x80", 0x10000}, Character{"\xf4\x8f\xbf\xbf", 0x10ffff}}) {
+    const Utf8Character found = FirstCharacter(std::string(character.bytes) + "x");
+    EXPECT_EQ(found.code, character.code);
+    EXPECT_EQ(found.num_bytes, std::ssize(character.bytes)) << uint32_t{character.code};
+  }
+  for (const char* bytes : {"\xc1\xbf", "\xe0\x9f\xbf", "\xed\xbf\xbf", "\xf0\x8f\xbf\xbf",
+                            "\xf7\xbf\xbf\xbf", "\xbf\xbf\xbf\xbf", "\xc2\xc0", "\xe2\x80\x7f"})
+    EXPECT_EQ(FirstCharacter(bytes).num_bytes, 0);
+}
+
+TEST(Printable, ShowsNoMoreThanTheseCommands) {
+  EXPECT_EQ(Printable("\xc2\xa0~\x20"), "\xc2\xa0~ ");
+  EXPECT_EQ(Printable("\x1f"), "\\u001f");
+  EXPECT_EQ(Printable("\xe2\x80\xa8\xe2\x80\xad"), "\xe2\x80\xa8\\u202d");
+  EXPECT_EQ(Printable("\xe2\x81\xa7\xe2\x81\xa8"), "\\u2067\\u2068");
 }
 
 }  // namespace

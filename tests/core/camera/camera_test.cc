@@ -1,6 +1,9 @@
 #include "core/camera/camera.h"
 
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -209,6 +212,254 @@ TEST(Camera, ImpossibleIntrinsicsAreErrors) {
   flat.height = 0;
   EXPECT_FALSE(CheckCamera(flat).ok());
   EXPECT_FALSE(CheckCamera(MakeCamera(CameraModel::kFov, {500, 500, 320, 240, 3.2})).ok());
+}
+
+// Where COLMAP sees (x/z, y/z), written as its camera models are.
+Eigen::Vector2d ByColmapsFormula(const Camera& camera, double u, double v) {
+  const PooledVector<double>& p = camera.params;
+  const auto radial = [](double squared, const std::vector<double>& k) {
+    double sum = 0;
+    for (size_t i = 0; i < k.size(); ++i) sum += k[i] * std::pow(squared, static_cast<double>(i + 1));
+    return sum;
+  };
+  const double r = std::hypot(u, v), theta = std::atan(r);
+  const double uf = r > 0 ? u * theta / r : u, vf = r > 0 ? v * theta / r : v;  // of a fisheye
+  const double r2 = r * r, theta2 = theta * theta;
+  const auto decentered = [](double x, double y, double p1, double p2) {
+    const double squared = x * x + y * y;
+    return Eigen::Vector2d(2 * p1 * x * y + p2 * (squared + 2 * x * x),
+                           2 * p2 * x * y + p1 * (squared + 2 * y * y));
+  };
+  switch (camera.model) {
+    case CameraModel::kSimplePinhole:
+      return {p[0] * u + p[1], p[0] * v + p[2]};
+    case CameraModel::kPinhole:
+      return {p[0] * u + p[2], p[1] * v + p[3]};
+    case CameraModel::kSimpleRadial:
+      return {p[0] * u * (1 + p[3] * r2) + p[1], p[0] * v * (1 + p[3] * r2) + p[2]};
+    case CameraModel::kRadial: {
+      const double ratio = 1 + radial(r2, {p[3], p[4]});
+      return {p[0] * u * ratio + p[1], p[0] * v * ratio + p[2]};
+    }
+    case CameraModel::kOpenCv: {
+      const double ratio = 1 + radial(r2, {p[4], p[5]});
+      const Eigen::Vector2d d = decentered(u, v, p[6], p[7]);
+      return {p[0] * (u * ratio + d.x()) + p[2], p[1] * (v * ratio + d.y()) + p[3]};
+    }
+    case CameraModel::kOpenCvFisheye: {
+      const double ratio = 1 + radial(theta2, {p[4], p[5], p[6], p[7]});
+      return {p[0] * uf * ratio + p[2], p[1] * vf * ratio + p[3]};
+    }
+    case CameraModel::kFullOpenCv: {
+      const double ratio = (1 + radial(r2, {p[4], p[5], p[8]})) / (1 + radial(r2, {p[9], p[10], p[11]}));
+      const Eigen::Vector2d d = decentered(u, v, p[6], p[7]);
+      return {p[0] * (u * ratio + d.x()) + p[2], p[1] * (v * ratio + d.y()) + p[3]};
+    }
+    case CameraModel::kFov: {
+      const double ratio =
+          r > 0 ? std::atan(r * 2 * std::tan(p[4] / 2)) / (r * p[4]) : 2 * std::tan(p[4] / 2) / p[4];
+      return {p[0] * u * ratio + p[2], p[1] * v * ratio + p[3]};
+    }
+    case CameraModel::kSimpleRadialFisheye:
+      return {p[0] * uf * (1 + p[3] * theta2) + p[1], p[0] * vf * (1 + p[3] * theta2) + p[2]};
+    case CameraModel::kRadialFisheye: {
+      const double ratio = 1 + radial(theta2, {p[3], p[4]});
+      return {p[0] * uf * ratio + p[1], p[0] * vf * ratio + p[2]};
+    }
+    case CameraModel::kThinPrismFisheye: {
+      const double ratio = 1 + radial(theta2, {p[4], p[5], p[8], p[9]});
+      const Eigen::Vector2d d = decentered(uf, vf, p[6], p[7]);
+      return {p[0] * (uf * ratio + d.x() + p[10] * theta2) + p[2],
+              p[1] * (vf * ratio + d.y() + p[11] * theta2) + p[3]};
+    }
+    case CameraModel::kEquirectangular: {
+      const double longitude = std::atan2(u, 1), latitude = std::atan2(v, std::hypot(u, 1));
+      return {camera.width * (0.5 + longitude / (2 * M_PI)), camera.height * (0.5 + latitude / M_PI)};
+    }
+  }
+  return {};
+}
+
+TEST(Camera, EveryModelIsColmapsFormula) {
+  std::vector<Camera> cameras = OneOfEachModel();
+  for (const Camera& camera : StrongOnes()) cameras.push_back(camera);
+  for (const Camera& camera : cameras) {
+    for (const double u : {-0.4, 0.0, 0.1, 0.5}) {
+      for (const double v : {-0.3, 0.0, 0.2}) {
+        const auto pixel = ImageFromCamera(camera, {2 * u, 2 * v, 2});
+        ASSERT_TRUE(pixel) << CameraModelName(camera.model);
+        EXPECT_LT((*pixel - ByColmapsFormula(camera, u, v)).norm(), 1e-9)
+            << CameraModelName(camera.model) << " " << u << " " << v;
+      }
+    }
+  }
+}
+
+TEST(Camera, WithoutAFieldOfViewTheModelIsAPinhole) {
+  const Camera pinhole = MakeCamera(CameraModel::kPinhole, {300, 310, 320, 240});
+  for (const double omega : {0.0, 1e-7, -1e-7, 2e-6}) {
+    const Camera camera = MakeCamera(CameraModel::kFov, {300, 310, 320, 240, omega});
+    EXPECT_LT((*ImageFromCamera(camera, {1, -2, 4}) - *ImageFromCamera(pinhole, {1, -2, 4})).norm(), 1e-6);
+    EXPECT_LT((*BearingFromImage(camera, {100, 200}) - *BearingFromImage(pinhole, {100, 200})).norm(), 1e-9);
+    EXPECT_LT((*CameraFromImage(camera, {100, 200}) - *CameraFromImage(pinhole, {100, 200})).norm(), 1e-9);
+  }
+  const Camera wide = MakeCamera(CameraModel::kFov, {300, 310, 320, 240, 0.9});
+  const Camera same = MakeCamera(CameraModel::kFov, {300, 310, 320, 240, -0.9});
+  EXPECT_EQ(*ImageFromCamera(wide, {1, -2, -0.1}), *ImageFromCamera(same, {1, -2, -0.1}));
+  EXPECT_EQ(*BearingFromImage(wide, {100, 200}), *BearingFromImage(same, {100, 200}));
+}
+
+TEST(Camera, AFieldOfViewEndsBehindTheCamera) {
+  // 180 degrees off the axis lie pi / omega focal lengths from the middle.
+  const Camera camera = MakeCamera(CameraModel::kFov, {100, 100, 0, 0, 1});
+  const Eigen::Vector3d bearing = *BearingFromImage(camera, {314.1, 0});
+  EXPECT_LT((bearing + Eigen::Vector3d::UnitZ()).norm(), 0.002);
+  EXPECT_FALSE(BearingFromImage(camera, {314.2, 0}));
+}
+
+TEST(Camera, WhatLiesOnTheAxisIsSeenInTheMiddle) {
+  for (const Camera& camera : OneOfEachModel()) {
+    EXPECT_LT((*ImageFromCamera(camera, {0, 0, 3}) - camera.PrincipalPoint()).norm(), 1e-12);
+    for (const double beside : {0.0, 1e-13, 1e-8, 1e-4}) {
+      const Eigen::Vector3d bearing =
+          *BearingFromImage(camera, camera.PrincipalPoint() + Eigen::Vector2d(beside, 0));
+      EXPECT_NEAR(bearing.z(), 1, 1e-9) << CameraModelName(camera.model);
+      if (camera.model == CameraModel::kFov) continue;  // its middle is drawn larger
+      EXPECT_NEAR(bearing.x(), beside / camera.FocalX(), 2e-12)
+          << CameraModelName(camera.model);
+    }
+  }
+}
+
+TEST(Camera, FocalLengthsAndMiddle) {
+  const Camera one = MakeCamera(CameraModel::kRadial, {300, 320, 240, -0.3, 0.1});
+  EXPECT_EQ(one.FocalX(), 300);
+  EXPECT_EQ(one.FocalY(), 300);
+  EXPECT_EQ(one.PrincipalPoint(), Eigen::Vector2d(320, 240));
+  const Camera two = MakeCamera(CameraModel::kPinhole, {300, 310, 320, 240});
+  EXPECT_EQ(two.FocalX(), 300);
+  EXPECT_EQ(two.FocalY(), 310);
+  EXPECT_EQ(two.MeanFocal(), 305);
+  EXPECT_EQ(two.PrincipalPoint(), Eigen::Vector2d(320, 240));
+  // 640 px for 360 degrees, 480 for 180.
+  const Camera panorama = MakeCamera(CameraModel::kEquirectangular, {});
+  EXPECT_NEAR(panorama.FocalX(), 101.859, 1e-3);
+  EXPECT_NEAR(panorama.FocalY(), 152.789, 1e-3);
+  EXPECT_EQ(panorama.PrincipalPoint(), Eigen::Vector2d(320, 240));
+  const Camera guessed = GuessCamera(7, 640, 480), upright = GuessCamera(7, 480, 640);
+  EXPECT_EQ(guessed.camera_id, 7u);
+  EXPECT_EQ(guessed.params, (PooledVector<double>{768, 320, 240}));
+  EXPECT_EQ(upright.params, (PooledVector<double>{768, 240, 320}));
+  EXPECT_FALSE(guessed.has_focal_prior);
+  EXPECT_EQ(guessed.model, CameraModel::kSimplePinhole);
+}
+
+TEST(Camera, NormalisedCoordinatesEnd86DegreesOffTheAxis) {
+  const Camera camera = MakeCamera(CameraModel::kSimpleRadialFisheye, {100, 0, 0, 0});
+  EXPECT_NEAR(CameraFromImage(camera, {149.9, 0})->x(), std::tan(1.499), 1e-9);
+  EXPECT_FALSE(CameraFromImage(camera, {150.1, 0}));
+}
+
+// Where the map with decentering or a thin prism folds, by its coefficients, in a direction: the determinant
+// of its Jacobian is 0 there.
+TEST(Camera, DecenteredImagesEndAtTheirFolds) {
+  struct Fold {
+    double p1, p2, sx, sy, x, y, angle;
+  };
+  for (const Fold& fold : {
+           Fold{0, -0.2, 0, 0, 1, 0, 1 / 1.2},           // 1 + 6 p2 x
+           Fold{0, 0.2, 0, 0, -1, 0, 1 / 1.2},           //
+           Fold{-0.2, 0, 0, 0, 0, 1, 1 / 1.2},           // 1 + 6 p1 y
+           Fold{0.6, 0, 0, 0, 1, 0, 1 / 1.2},            // 1 - (2 p1 x)^2
+           Fold{0, 0.6, 0, 0, 0, 1, 1 / 1.2},            // 1 - (2 p2 y)^2
+           Fold{0, 0, -0.6, 0, 1, 0, 1 / 1.2},           // 1 + 2 sx x
+           Fold{0, 0, 0, -0.6, 0, 1, 1 / 1.2},           // 1 + 2 sy y
+           Fold{0, 0, -0.6, -0.6, 1, 1, M_SQRT2 / 2.4},  // 1 + 2 sx x + 2 sy y
+           Fold{0, 0, -0.6, 0.4, 1, -1, M_SQRT2 / 2},    //
+       }) {
+    const Camera camera = MakeCamera(CameraModel::kThinPrismFisheye,
+                                     {100, 100, 0, 0, 0, 0, fold.p1, fold.p2, 0, 0, fold.sx, fold.sy});
+    const Eigen::Vector2d direction = Eigen::Vector2d(fold.x, fold.y).normalized();
+    const auto seen = [&](double angle) {
+      return ImageFromCamera(
+          camera,
+          (std::sin(angle) * direction).homogeneous().cwiseProduct(Eigen::Vector3d(1, 1, std::cos(angle))));
+    };
+    const auto before = seen(0.99 * fold.angle);
+    ASSERT_TRUE(before) << fold.p1 << " " << fold.p2 << " " << fold.sx << " " << fold.sy;
+    EXPECT_FALSE(seen(1.01 * fold.angle)) << fold.p1 << " " << fold.p2 << " " << fold.sx << " " << fold.sy;
+    EXPECT_FALSE(seen(1.9 * fold.angle));
+    const auto bearing = BearingFromImage(camera, *before);
+    ASSERT_TRUE(bearing);
+    EXPECT_NEAR(std::acos(bearing->z()), 0.99 * fold.angle, 1e-6);
+  }
+}
+
+TEST(Camera, ARationalImageEndsWhereItsDenominatorIsZero) {
+  // r / (1 - r^2) grows up to r = 1 and comes from below beyond.
+  const Camera camera = MakeCamera(CameraModel::kFullOpenCv, {100, 100, 0, 0, 0, 0, 0, 0, 0, -1, 0, 0});
+  EXPECT_NEAR(ImageFromCamera(camera, {0.9, 0, 1})->x(), 90 / 0.19, 1e-9);
+  EXPECT_FALSE(ImageFromCamera(camera, {1.1, 0, 1}));
+  EXPECT_NEAR(CameraFromImage(camera, {90 / 0.19, 0})->x(), 0.9, 1e-9);
+  // r (1 + r^2) / (1 + 2 r^2 + 4 r^4): the numerator (1 + 3 t)(1 + 2 t + 4 t^2) - (1 + t)(4 t + 16 t^2) of
+  // its slope is 1 + t - 10 t^2 - 4 t^3, with a root at t = 0.3437.
+  const Camera folding = MakeCamera(CameraModel::kFullOpenCv, {100, 100, 0, 0, 1, 0, 0, 0, 0, 2, 4, 0});
+  EXPECT_TRUE(ImageFromCamera(folding, {std::sqrt(0.340), 0, 1}));
+  EXPECT_FALSE(ImageFromCamera(folding, {std::sqrt(0.348), 0, 1}));
+}
+
+TEST(Camera, SizesAndFocalLengthsHaveBounds) {
+  const auto check = [](int width, int height, PooledVector<double> params) {
+    Camera camera = MakeCamera(CameraModel::kPinhole, std::move(params));
+    camera.width = width;
+    camera.height = height;
+    return CheckCamera(camera).ok();
+  };
+  EXPECT_TRUE(check(1, 1, {500, 510, 320, 240}));
+  EXPECT_TRUE(check(65536, 65536, {500, 510, 320, 240}));
+  EXPECT_FALSE(check(0, 480, {500, 510, 320, 240}));
+  EXPECT_FALSE(check(640, 0, {500, 510, 320, 240}));
+  EXPECT_FALSE(check(65537, 480, {500, 510, 320, 240}));
+  EXPECT_FALSE(check(640, 65537, {500, 510, 320, 240}));
+  EXPECT_FALSE(check(640, 480, {0, 510, 320, 240}));
+  EXPECT_FALSE(check(640, 480, {500, 0, 320, 240}));
+  EXPECT_TRUE(check(640, 480, {0.5, 0.5, 320, 240}));
+  EXPECT_TRUE(CheckCamera(MakeCamera(CameraModel::kFov, {500, 500, 320, 240, -3.1})).ok());
+  EXPECT_FALSE(CheckCamera(MakeCamera(CameraModel::kFov, {500, 500, 320, 240, -3.2})).ok());
+  // Only FOV's fifth parameter is an angle.
+  EXPECT_TRUE(CheckCamera(MakeCamera(CameraModel::kRadialFisheye, {500, 320, 240, 0, 3.2})).ok());
+}
+
+TEST(CameraFromWords, IsColmapsLine) {
+  const Camera camera = *CameraFromWords({"1", "PINHOLE", "640", "480", "500", "510.5", "320", "-240"}, 1);
+  EXPECT_EQ(camera.model, CameraModel::kPinhole);
+  EXPECT_EQ(camera.width, 640);
+  EXPECT_EQ(camera.height, 480);
+  EXPECT_EQ(camera.params, (PooledVector<double>{500, 510.5, 320, -240}));
+  EXPECT_EQ(camera.camera_id, 1u);
+  EXPECT_EQ(CameraFromWords({"EQUIRECTANGULAR", "640", "480"}, 0)->params.size(), 0u);
+}
+
+TEST(CameraFromWords, APanoramasSizeMayBeRepeated) {
+  EXPECT_EQ(CameraFromWords({"EQUIRECTANGULAR", "640", "480", "640", "480"}, 0)->params.size(), 0u);
+  EXPECT_FALSE(CameraFromWords({"EQUIRECTANGULAR", "640", "480", "640", "481"}, 0).ok());
+  EXPECT_FALSE(CameraFromWords({"SIMPLE_PINHOLE", "640", "480", "640", "480"}, 0).ok());
+}
+
+TEST(CameraFromWords, OtherWordsAreErrors) {
+  const auto error = [](const std::vector<std::string>& words) { return CameraFromWords(words, 1).error(); };
+  EXPECT_EQ(error({"1", "PINHOLE", "640"}).message, "expected MODEL WIDTH HEIGHT PARAMS, found 2 fields");
+  EXPECT_EQ(error({"1", "PINHOLE", "640"}).code, ErrorCode::kCorrupt);
+  EXPECT_EQ(error({"1", "BRICK", "640", "480"}).code, ErrorCode::kUnsupported);
+  EXPECT_EQ(error({"1", "PINHOLE", "wide", "480", "5"}).message,
+            "image size 'wide x 480' is not two positive integers");
+  EXPECT_EQ(error({"1", "PINHOLE", "640", "-480", "5"}).message,
+            "image size '640 x -480' is not two positive integers");
+  EXPECT_EQ(error({"1", "SIMPLE_PINHOLE", "640", "480", "5", "far", "6"}).message,
+            "camera parameter 'far' is not a number");
+  EXPECT_EQ(error({"1", "SIMPLE_PINHOLE", "640", "480", "5"}).code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error({"1", "SIMPLE_PINHOLE", "4294967295", "480", "5", "6", "7"}).code,
+            ErrorCode::kInvalidArgument);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -117,6 +118,49 @@ TEST(Panorama, ViewsThatLeaveGapsAreRefused) {
   EXPECT_FALSE(CheckPanoramaOptions(options).ok());
   options.panorama_view_deg = 90;
   EXPECT_TRUE(CheckPanoramaOptions(options).ok());
+}
+
+TEST(Panorama, TheErrorSaysHowWideViewsMustBe) {
+  PanoramaOptions options;
+  options.num_panorama_views = 5;
+  options.panorama_view_deg = 71;
+  EXPECT_NE(CheckPanoramaOptions(options).error().message.find(
+                "5 views of it leave gaps in a panorama; expected at least 72"),
+            std::string::npos);
+  options.panorama_view_deg = 72;
+  EXPECT_TRUE(CheckPanoramaOptions(options).ok());
+}
+
+TEST(Panorama, AViewHasAPixelAtLeast) {
+  EXPECT_EQ(PanoramaViewCamera(MakePanorama(2), PanoramaOptions()).width, 1);
+  const Camera camera = PanoramaViewCamera(MakePanorama(512), PanoramaOptions());
+  EXPECT_EQ(camera.height, 162);
+  EXPECT_NEAR(camera.FocalX(), 512 / (2 * M_PI), 1e-12);
+  EXPECT_EQ(camera.FocalX(), camera.FocalY());
+  EXPECT_EQ(camera.PrincipalPoint(), Eigen::Vector2d(81, 81));
+}
+
+TEST(Panorama, GreyValuesAreLinearBetweenPixelsOverTheSeamAndToThePoles) {
+  // Of 8 x 4 pixels, each 45 degrees wide; a view of one pixel looks at the place where its middle ray ends.
+  cv::Mat image(4, 8, CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 8; ++x) image.at<uchar>(y, x) = static_cast<uchar>(10 + 10 * x + 40 * y);
+  }
+  // Looks down by a number of pixels below the equator, at the middle of the image or, of two views, at the
+  // seam.
+  const auto at = [&](double below, int view) {
+    Camera camera;
+    camera.model = CameraModel::kSimplePinhole;
+    camera.width = camera.height = 1;
+    camera.params = {1, 0.5, 0.5 - std::tan(below * M_PI / 4)};
+    return static_cast<int>(CutPanoramaView(image, camera, view, 2).at<uchar>(0, 0));
+  };
+  EXPECT_NEAR(at(0.5, 0), (40 + 50) / 2 + 80, 1);   // in row 2, between columns 3 and 4
+  EXPECT_NEAR(at(0, 0), (40 + 50) / 2 + 60, 1);     // between rows 1 and 2
+  EXPECT_NEAR(at(0.25, 0), (40 + 50) / 2 + 70, 1);  // nearer to row 2
+  EXPECT_NEAR(at(0.5, 1), (10 + 80) / 2 + 80, 1);   // in row 2, between the last column and the first
+  EXPECT_NEAR(at(1.9, 0), (40 + 50) / 2 + 120, 1);  // below the middle of the last row
+  EXPECT_NEAR(at(-1.9, 0), (40 + 50) / 2, 1);       // above that of the first
 }
 
 }  // namespace

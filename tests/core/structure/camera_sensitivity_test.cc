@@ -1,5 +1,8 @@
 #include "core/structure/camera_sensitivity.h"
 
+#include <cmath>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "core/camera/pixel_ray.h"
@@ -32,6 +35,51 @@ TEST(CameraSensitivity, ResidualsFollowAChangedCamera) {
     EXPECT_LT((residual - (*ImageFromCamera(changed, point) - pixel)).norm(), 0.05) << pixel.transpose();
     // What the growth is there for: a longer focal length stretches residuals.
     EXPECT_NEAR(sensitivity[0].growth(0, 0), 1.0 / 500, 3e-4);
+  }
+}
+
+TEST(CameraSensitivity, FocalLengthsAreTheFirstParameters) {
+  for (const CameraModel model :
+       {CameraModel::kSimplePinhole, CameraModel::kSimpleRadial, CameraModel::kRadial,
+        CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye})
+    EXPECT_EQ(NumFocals(model), 1) << CameraModelName(model);
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kOpenCvFisheye, CameraModel::kFullOpenCv,
+        CameraModel::kFov, CameraModel::kThinPrismFisheye})
+    EXPECT_EQ(NumFocals(model), 2) << CameraModelName(model);
+}
+
+TEST(CameraSensitivity, OfAPinholeItIsTheRay) {
+  // u = fx x + cx, v = fy y + cy.
+  Camera camera;
+  camera.model = CameraModel::kPinhole;
+  camera.params = {500, 400, 322, 238};
+  const CameraSensitivity sensitivity = SensitivityOf(camera, {422, 138}, {1, 0, 3});
+  ASSERT_EQ(sensitivity.size(), 3u);
+  EXPECT_LT((sensitivity[0].by_param - Eigen::Vector2d(0, -0.25)).norm(), 1e-6);
+  EXPECT_LT((sensitivity[1].by_param - Eigen::Vector2d(0.2, 0)).norm(), 1e-6);
+  EXPECT_LT((sensitivity[2].by_param - Eigen::Vector2d(0, 1)).norm(), 1e-6);
+  const Eigen::Matrix2d by_fy{{0, 0}, {0, 1.0 / 400}}, by_fx{{1.0 / 500, 0}, {0, 0}};
+  EXPECT_LT((sensitivity[0].growth - by_fy).norm(), 1e-6);
+  EXPECT_LT((sensitivity[1].growth - by_fx).norm(), 1e-6);
+  EXPECT_LT(sensitivity[2].growth.norm(), 1e-6);
+}
+
+TEST(CameraSensitivity, IsNothingNextToWhatTheModelDoesNotSee) {
+  // A view of 360 degrees: rays end on a circle of pi / omega focal lengths, here of 100 pi px.
+  Camera camera;
+  camera.model = CameraModel::kFov;
+  camera.params = {100, 100, 400, 400, 1};
+  const double edge = 400 + 100 * M_PI;
+  EXPECT_GT(SensitivityOf(camera, {edge - 1.1, 400}, {0})[0].by_param.norm(), 1);
+  for (const Eigen::Vector2d& pixel :
+       {Eigen::Vector2d(edge - 0.9, 400), Eigen::Vector2d(400, edge - 0.9),
+        Eigen::Vector2d(800 - edge + 0.9, 400), Eigen::Vector2d(400, 800 - edge + 0.9),
+        Eigen::Vector2d(edge + 5, 400)}) {
+    const CameraSensitivity sensitivity = SensitivityOf(camera, pixel, {0, 4});
+    ASSERT_EQ(sensitivity.size(), 2u);
+    EXPECT_EQ(sensitivity[0].by_param.norm(), 0) << pixel.transpose();
+    EXPECT_EQ(sensitivity[0].growth.norm(), 0);
   }
 }
 

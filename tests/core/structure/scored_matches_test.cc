@@ -111,5 +111,13 @@ TEST_F(ScoredMatchesTest, AFolderThatIsNotThereIsAnError) {
   EXPECT_FALSE(UnionMatches(std::move(others), &num_conflicts).ok());
 }
 
+TEST_F(ScoredMatchesTest, SoManyAreInMemoryAndNoMore) {
+  ScoredMatches matches({4, 4}, Beside() + ".d/classes.db", 3);
+  for (KeypointIdx k = 0; k < 3; ++k) matches.Add({0, k}, {1, k}, 1);
+  EXPECT_TRUE(matches.status().ok());  // nothing was written yet
+  matches.Add({0, 3}, {1, 3}, 1);
+  EXPECT_FALSE(matches.status().ok());
+}
+
 }  // namespace
 }  // namespace cairn
