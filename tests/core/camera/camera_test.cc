@@ -283,6 +283,14 @@ Eigen::Vector2d ByColmapsFormula(const Camera& camera, double u, double v) {
 TEST(Camera, EveryModelIsColmapsFormula) {
   std::vector<Camera> cameras = OneOfEachModel();
   for (const Camera& camera : StrongOnes()) cameras.push_back(camera);
+  // Each of the parameters after the middle alone.
+  for (size_t p = 4; p < 12; ++p) {
+    for (const CameraModel model : {CameraModel::kFullOpenCv, CameraModel::kThinPrismFisheye}) {
+      PooledVector<double> params = {300, 310, 320, 240, 0, 0, 0, 0, 0, 0, 0, 0};
+      params[p] = 0.1;
+      cameras.push_back(MakeCamera(model, std::move(params)));
+    }
+  }
   for (const Camera& camera : cameras) {
     for (const double u : {-0.4, 0.0, 0.1, 0.5}) {
       for (const double v : {-0.3, 0.0, 0.2}) {
@@ -325,8 +333,7 @@ TEST(Camera, WhatLiesOnTheAxisIsSeenInTheMiddle) {
           *BearingFromImage(camera, camera.PrincipalPoint() + Eigen::Vector2d(beside, 0));
       EXPECT_NEAR(bearing.z(), 1, 1e-9) << CameraModelName(camera.model);
       if (camera.model == CameraModel::kFov) continue;  // its middle is drawn larger
-      EXPECT_NEAR(bearing.x(), beside / camera.FocalX(), 2e-12)
-          << CameraModelName(camera.model);
+      EXPECT_NEAR(bearing.x(), beside / camera.FocalX(), 2e-12) << CameraModelName(camera.model);
     }
   }
 }
@@ -460,6 +467,42 @@ TEST(CameraFromWords, OtherWordsAreErrors) {
   EXPECT_EQ(error({"1", "SIMPLE_PINHOLE", "640", "480", "5"}).code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(error({"1", "SIMPLE_PINHOLE", "4294967295", "480", "5", "6", "7"}).code,
             ErrorCode::kInvalidArgument);
+}
+
+// Along an axis, where the formula turns back.
+TEST(Camera, DistortedAndDecenteredImagesEndWhereTheirFormulaTurnsBack) {
+  for (const bool is_along_x : {true, false}) {
+    const double p1 = is_along_x ? 0 : -0.1, p2 = is_along_x ? -0.1 : 0;
+    for (const Camera& camera :
+         {MakeCamera(CameraModel::kOpenCv, {1, 1, 0, 0, -0.1, 0.01, p1, p2}),
+          MakeCamera(CameraModel::kOpenCv, {1, 1, 0, 0, 0.2, -0.01, p1, p2}),
+          MakeCamera(CameraModel::kFullOpenCv, {1, 1, 0, 0, 0, 0, p1, p2, 0, 0.1, 0, 0}),
+          MakeCamera(CameraModel::kFullOpenCv, {1, 1, 0, 0, 0.05, 0.01, p1, p2, 0.002, 0.15, 0.02, 0.003})}) {
+      constexpr double kStep = 1e-4;
+      const auto at = [&](double r) { return is_along_x ? Eigen::Vector2d(r, 0) : Eigen::Vector2d(0, r); };
+      double fold = 0;
+      while (ByColmapsFormula(camera, at(fold + kStep).x(), at(fold + kStep).y()).norm() >
+             ByColmapsFormula(camera, at(fold).x(), at(fold).y()).norm())
+        fold += kStep;
+      ASSERT_GT(fold, 0.5);
+      ASSERT_LT(fold, 5);
+      const auto pixel = ImageFromCamera(camera, at(0.98 * fold).homogeneous());
+      ASSERT_TRUE(pixel) << fold;
+      EXPECT_FALSE(ImageFromCamera(camera, at(1.02 * fold).homogeneous())) << fold;
+      EXPECT_LT((*CameraFromImage(camera, *pixel) - at(0.98 * fold)).norm(), 1e-6);
+      EXPECT_FALSE(
+          CameraFromImage(camera, at(1.01 * ByColmapsFormula(camera, at(fold).x(), at(fold).y()).norm())));
+    }
+  }
+}
+
+TEST(Camera, ColmapsNumbersAreZeroToTen) {
+  for (int id = 0; id <= 10; ++id) {
+    EXPECT_EQ(static_cast<int>(*CameraModelFromId(id)), id);
+    EXPECT_EQ(*CameraModelFromName(CameraModelName(*CameraModelFromId(id))), *CameraModelFromId(id));
+  }
+  EXPECT_FALSE(CameraModelFromId(11).ok());
+  EXPECT_FALSE(CameraModelFromId(-1).ok());
 }
 
 }  // namespace

@@ -163,5 +163,18 @@ TEST(Panorama, GreyValuesAreLinearBetweenPixelsOverTheSeamAndToThePoles) {
   EXPECT_NEAR(at(-1.9, 0), (40 + 50) / 2, 1);       // above that of the first
 }
 
+TEST(Panorama, ThreeTo36ViewsOf20To120DegreesAreAllowed) {
+  const auto is_allowed = [](int num_views, double view_deg) {
+    PanoramaOptions options{.num_panorama_views = num_views, .panorama_view_deg = view_deg};
+    return CheckOptions(DescribeOptions(&options)).ok();
+  };
+  EXPECT_TRUE(is_allowed(3, 120));
+  EXPECT_TRUE(is_allowed(36, 20));
+  EXPECT_FALSE(is_allowed(2, 90));
+  EXPECT_FALSE(is_allowed(37, 90));
+  EXPECT_FALSE(is_allowed(6, 19.9));
+  EXPECT_FALSE(is_allowed(6, 120.1));
+}
+
 }  // namespace
 }  // namespace cairn

@@ -1,6 +1,7 @@
 #include "core/geometry/minimal_pose.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -127,6 +128,28 @@ TEST(PosesFromThreeRays, OfOneCameraTheyAreThoseOfTheThreePointProblem) {
   }
   EXPECT_GT(num_of_opencv, 500);
   EXPECT_GE(num_same, 0.99 * num_of_opencv);
+}
+
+// Over the circle through the three points two of the poses are one: the polynomial only touches zero there.
+TEST(PosesFromThreeRays, PosesThatAreDoubleAreFound) {
+  int num_found = 0, num_trials = 0;
+  for (const double height_m : {0.7, 1.5, 3.0}) {
+    for (const double around : {0.1, 0.5, 0.9, 1.3, 1.7, 2.3, 3.9, 5.1}) {
+      const Eigen::Vector3d center(std::cos(around), std::sin(around), -height_m);
+      std::array<RigRay, 3> rays;
+      std::array<Eigen::Vector3d, 3> points;
+      for (int i = 0; i < 3; ++i) {
+        const double angle = 2 * M_PI * i / 3 + (i == 2 ? 0.3 : 0);
+        points[i] = {std::cos(angle), std::sin(angle), 0};
+        rays[i].direction = (points[i] - center).normalized();
+      }
+      const MinimalPoses poses = PosesFromThreeRays(rays, points);
+      for (const Pose& pose : poses) EXPECT_LT(WorstMiss(pose, rays, points), 1e-5);
+      num_found += Nearest(poses, {Eigen::Quaterniond::Identity(), -center}) < 1e-3 ? 1 : 0;
+      ++num_trials;
+    }
+  }
+  EXPECT_GE(num_found, num_trials - 1);
 }
 
 TEST(PosesFromThreeRays, NothingIsDeterminedByParallelRaysOrPointsInALine) {

@@ -117,6 +117,10 @@ TEST(BlockCholesky, SolvesSparseSystems) {
   ExpectSolves(RandomMatrix(std::vector<int>(60, 6), 0.05, 2));
   ExpectSolves(RandomMatrix(std::vector<int>(40, 5), 0, 2));
   ExpectSolves(Chain(200));
+  std::vector<int> sizes;  // one to seven rows, odd sums of them too
+  for (int i = 0; i < 80; ++i) sizes.push_back(1 + i % 7);
+  for (const double density : {0.02, 0.05, 0.2}) ExpectSolves(RandomMatrix(sizes, density, 8));
+  for (int n = 1; n <= 20; ++n) ExpectSolves(RandomMatrix(std::vector<int>(n, 1), 0.3, n));
 }
 
 TEST(BlockCholesky, SolvesWhereSupernodesAreManyAndWide) {
@@ -164,6 +168,10 @@ TEST(BlockCholesky, ColumnsOfLikeStructureAreFactorisedTogether) {
   // Of 192 columns at most: 32 blocks.
   const BlockMatrix wide = RandomMatrix(std::vector<int>(100, 6), 1, 5);
   EXPECT_EQ(BlockCholesky(wide.sizes, wide.neighbours).num_supernodes(), 4);
+  for (const int num_columns : {192, 193}) {
+    const BlockMatrix narrow = RandomMatrix(std::vector<int>(num_columns, 1), 1, 5);
+    EXPECT_EQ(BlockCholesky(narrow.sizes, narrow.neighbours).num_supernodes(), num_columns - 191);
+  }
   // Nothing in common.
   EXPECT_EQ(BlockCholesky({6, 6, 6}, {{}, {}, {}}).num_supernodes(), 3);
 }

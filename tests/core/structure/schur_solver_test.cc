@@ -247,5 +247,14 @@ TEST(SchurSolver, ASlopeThatIsNoNumberIsNotGoneAlong) {
   EXPECT_EQ(solution.x, 0);
 }
 
+TEST(SchurSolver, DampingHasALeastValue) {
+  // A slope of 1e-4: its square, 1e-8, is damped as 1e-6 would be, here by a hundredth of that.
+  const auto line = [](double x) { return 1 - 1e-4 * x; };
+  const CurveSolution solution =
+      SolveCurve(line, {.max_num_iterations = 1, .initial_trust_region_radius = 100}, 0, -1e-4);
+  ASSERT_GE(solution.tried.size(), 2u);
+  EXPECT_NEAR(solution.tried[1], 5000, 5);
+}
+
 }  // namespace
 }  // namespace cairn
