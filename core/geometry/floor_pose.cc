@@ -10,6 +10,7 @@ FloorPose FloorPoseOf(const Pose& cam_from_world, const Pose& floor_from_world) 
     forward = floor_from_world.rotation * (cam_from_world.rotation.conjugate() * -Eigen::Vector3d::UnitY());
   double heading_deg = DegFromRad(std::atan2(forward.y(), forward.x()));
   if (heading_deg < 0) heading_deg += 360;
+  if (heading_deg >= 360) heading_deg = 0;  // of a turn that is as good as none
   return {center.head<2>(), heading_deg};
 }
 

@@ -44,6 +44,17 @@ TEST(FloorPoseOf, Within15DegreesOfTheVerticalTheTopOfTheImageIsAhead) {
   EXPECT_NEAR(FloorPoseOf(LooksTo(200, -90, 0, {0, 0, 0}), Pose()).heading_deg, 200, 1e-9);
 }
 
+TEST(FloorPoseOf, AHeadingHardlyBelowZeroIsNoWholeTurn) {
+  for (const double turn_rad : {-1e-14, -3e-16, -1e-16, 0.0, 3e-16}) {
+    Pose floor_from_world;
+    floor_from_world.rotation = Eigen::Quaterniond(1, 0, 0, 0.5 * turn_rad);
+    const double heading_deg = FloorPoseOf(LooksTo(0, 0, 0, {0, 0, 0}), floor_from_world).heading_deg;
+    EXPECT_GE(heading_deg, 0) << turn_rad;
+    EXPECT_LT(heading_deg, 360) << turn_rad;
+    EXPECT_NEAR(AngleBetweenDeg(heading_deg, 0), 0, 1e-9) << turn_rad;
+  }
+}
+
 TEST(FloorPoseOf, IsInTheFrameOfTheFloor) {
   // The world's y points up.
   Pose floor_from_world;
