@@ -1,11 +1,12 @@
 #include "core/camera/panorama.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
 #include <Eigen/Geometry>
+
+#include "core/base/text.h"
 
 namespace cairn {
 namespace {
@@ -27,11 +28,6 @@ float SampleWrapped(const cv::Mat& image, const Eigen::Vector2d& pixel) {
     return (1 - right_weight) * row[column(0)] + right_weight * row[column(1)];
   };
   return (1 - low_weight) * row_value(0) + low_weight * row_value(1);
-}
-
-bool ParseCount(std::string_view text, int* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
 }
 
 }  // namespace
@@ -68,8 +64,8 @@ std::optional<PanoramaView> ParsePanoramaViewName(const std::string& name) {
   if (of == std::string::npos) return std::nullopt;
   PanoramaView view{name.substr(0, mark), 0, 0};
   const std::string_view text = name;
-  if (!ParseCount(text.substr(mark + 1, of - mark - 1), &view.view) ||
-      !ParseCount(text.substr(of + 2), &view.num_views) || view.view < 0 || view.view >= view.num_views) {
+  if (!ParseNumber(text.substr(mark + 1, of - mark - 1), &view.view) ||
+      !ParseNumber(text.substr(of + 2), &view.num_views) || view.view < 0 || view.view >= view.num_views) {
     return std::nullopt;
   }
   return view;
