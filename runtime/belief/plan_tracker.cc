@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/geometry/pose.h"
+#include "core/plan/wall_cells.h"
 
 namespace cairn {
 namespace {

@@ -94,6 +94,13 @@ TEST(PlacesOf, LookAlikesAreSeveralPlaces) {
   EXPECT_EQ(places[1].probability, 0.4);
   EXPECT_NEAR(std::sqrt(places[0].covariance(0, 0)), 0.3, 1e-9);
   EXPECT_NEAR(DegFromRad(std::sqrt(places[0].covariance(2, 2))), 5, 1e-9);
+  EXPECT_TRUE(places[0].covariance.isApprox(
+      Eigen::Vector3d(0.09, 0.09, std::pow(RadFromDeg(5), 2)).asDiagonal().toDenseMatrix()));
+  // A pose or a probability too many says nothing.
+  found.possible_probabilities = {0.5};
+  EXPECT_EQ(PlacesOf(found, MapHead(), {}).size(), 1u);
+  found.possible_probabilities = {0.4, 0.3, 0.2};
+  EXPECT_EQ(PlacesOf(found, MapHead(), {}).size(), 2u);
   found.possible_probabilities.clear();
   EXPECT_TRUE(PlacesOf(found, MapHead(), {}).empty());
   EXPECT_TRUE(PlacesOf(Localization(), MapHead(), {}).empty());

@@ -195,6 +195,7 @@ TEST(PlanTracker, ErrorsOfWheelsAreBelievedHoweverOftenTheyAreRead) {
     tracker.SeeImage(
         std::vector{PossiblePlace{{{{3, 3}, std::numbers::pi / 2}, 100 * Eigen::Matrix3d::Identity()}, 1}});
     EXPECT_NEAR(tracker.belief().places()[0].covariance(1, 1), 0.2 * 0.2 * 0.5 + 0.03 * 0.03, 1e-5);
+    EXPECT_NEAR(tracker.belief().places()[0].covariance(2, 2), heading + std::pow(RadFromDeg(3), 2), 1e-5);
   }
 }
 
@@ -209,6 +210,63 @@ TEST(PlanTracker, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(robot.Believed(), before);
   EXPECT_EQ(PlanTracker::Make(views, {.min_way_m = -1}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(PlanTracker::Make(Views(), {}).error().code, ErrorCode::kNoData);
+  EXPECT_TRUE(PlanTracker::Make(views, {.min_way_m = 0, .min_turn_deg = 0}).ok());
+}
+
+PossiblePlace Seen(const PlanarPose& pose, double probability) {
+  PossiblePlace place;
+  place.pose = pose;
+  place.covariance = 0.01 * Eigen::Matrix3d::Identity();
+  place.probability = probability;
+  return place;
+}
+
+// Of wheels without errors: exactly so far counts.
+TEST(PlanTracker, ALookCountsAfterAWayOrATurn) {
+  const Views views = TwinWings();
+  PlanTrackerOptions options{.min_way_m = 0.5, .min_turn_deg = 20};
+  options.wheels = {0, 1e-6, 0, 1e-6, 0};
+  const auto counts = [&](const FloorMotion& motion) {
+    PlanTracker tracker = *PlanTracker::Make(views, options);
+    tracker.SeeImage(std::vector{Seen({{3, 2}, 0}, 0.8)});
+    EXPECT_TRUE(tracker.Move(motion).ok());
+    const double before = tracker.belief().places()[0].probability;
+    tracker.SeeImage(
+        std::vector{Seen(PlanarPose{{3, 2}, 0} * PlanarPose{motion.way_m, motion.turn_left_rad}, 0.8)});
+    const double after = tracker.belief().places()[0].probability;
+    // From there on it is counted anew.
+    tracker.SeeImage(
+        std::vector{Seen(PlanarPose{{3, 2}, 0} * PlanarPose{motion.way_m, motion.turn_left_rad}, 0.8)});
+    EXPECT_EQ(tracker.belief().places()[0].probability, after);
+    return after != before;
+  };
+  EXPECT_FALSE(counts({{0, 0}, 0}));
+  EXPECT_FALSE(counts({{0.49, 0}, 0}));
+  EXPECT_TRUE(counts({{0.5, 0}, 0}));
+  EXPECT_TRUE(counts({{0, -0.51}, 0}));
+  EXPECT_FALSE(counts({{0, 0}, RadFromDeg(-19)}));
+  EXPECT_TRUE(counts({{0, 0}, RadFromDeg(20)}));
+  EXPECT_TRUE(counts({{0, 0}, RadFromDeg(-21)}));
+}
+
+// What a look says by itself is compared with being anywhere within the plan's walls, at least on a square
+// metre.
+TEST(PlanTracker, TheFloorIsAsLargeAsItsWallsReach) {
+  Views thin;
+  thin.plan.walls = {{{0, 0}, {3, 0}}};
+  for (const auto& [views, area_m2] : {std::pair<Views, double>{TwinWings(), 32 * 4}, {thin, 1}}) {
+    PlanTrackerOptions options{.min_way_m = 0};
+    options.wheels = {0, 1e-6, 0, 1e-6, 0};
+    PlanTracker tracker = *PlanTracker::Make(views, options);
+    PoseBelief belief(area_m2);
+    for (int i = 0; i < 2; ++i) {
+      const std::vector<PossiblePlace> seen = {Seen({{1 + 0.1 * i, 1}, 0}, 0.3)};
+      tracker.SeeImage(seen);
+      belief.Update(seen);
+      ASSERT_FALSE(tracker.belief().places().empty());
+      EXPECT_NEAR(tracker.belief().places()[0].probability, belief.places()[0].probability, 1e-8);
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "runtime/belief/pose_belief.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -231,6 +232,127 @@ TEST(PoseBelief, ADoubtedPlaceIsMovedButNoSurer) {
   ASSERT_NE(at, belief.places().end());
   EXPECT_NEAR(at->pose.position.x(), 1 + 0.4 * 0.04 / 0.05, 1e-6);
   EXPECT_NEAR(at->covariance(0, 0), 0.04, 1e-6);
+}
+
+// By hand: within two standard deviations of the better one, to which a little is added.
+TEST(PoseBelief, PlacesAreOneWithinTwoDeviationsOfTheBetter) {
+  const auto num_places = [](double apart_m, double turned_rad, double sigma) {
+    PoseBelief belief(kAreaM2);
+    // The other one's errors do not count.
+    belief.Update(std::vector{Place(1, 1, 0, 0.5, sigma), Place(1 + apart_m, 1, turned_rad, 0.4, 1)});
+    return belief.places().size();
+  };
+  // Of places that are known exactly it is the little alone: 0.1 m, 3 degrees.
+  EXPECT_EQ(num_places(0.098, 0, 1e-4), 1u);
+  EXPECT_EQ(num_places(0.102, 0, 1e-4), 2u);
+  EXPECT_EQ(num_places(0, RadFromDeg(2.99), 1e-4), 1u);
+  EXPECT_EQ(num_places(0, RadFromDeg(3.01), 1e-4), 2u);
+  // 2 sqrt(0.1^2 + 0.05^2) = 0.2236
+  EXPECT_EQ(num_places(0.221, 0, 0.1), 1u);
+  EXPECT_EQ(num_places(0.226, 0, 0.1), 2u);
+  // The same beside it.
+  PoseBelief beside(kAreaM2);
+  beside.Update(
+      std::vector{Place(1, 1, 0, 0.5, 1e-4), Place(1, 1.098, 0, 0.3, 1), Place(1, 1.102, 0, 0.1, 1)});
+  ASSERT_EQ(beside.places().size(), 2u);
+  EXPECT_NEAR(beside.places()[0].probability, 0.98 * 0.8, 1e-12);
+  EXPECT_EQ(beside.places()[1].pose.position.y(), 1.102);
+}
+
+TEST(PoseBelief, EquallyProbablePlacesStayInTheOrderInWhichTheyWereTold) {
+  PoseBelief belief(kAreaM2);
+  belief.Update(std::vector{Place(1, 1, 0, 0.25), Place(6, 6, 0, 0.25), Place(3, 9, 0, 0.25)});
+  ASSERT_EQ(belief.places().size(), 3u);
+  EXPECT_EQ(belief.places()[0].pose.position.x(), 1);
+  EXPECT_EQ(belief.places()[1].pose.position.x(), 6);
+  EXPECT_EQ(belief.places()[2].pose.position.x(), 3);
+}
+
+// A look that agrees with a place makes it many times as probable as chance; another place is given up by its
+// share of what then is all.
+TEST(PoseBelief, PlacesAreGivenUpByTheirShareOfAll) {
+  PoseBelief belief(kAreaM2, {.surprise_ratio = 0.1, .least_probability = 0.01});
+  belief.Update(std::vector{Place(1, 1, 0, 0.8), Place(8, 8, 0, 0.2)});
+  ASSERT_EQ(belief.places().size(), 2u);
+  belief.Update(std::vector{Place(1, 1, 0, 1)});
+  ASSERT_EQ(belief.places().size(), 1u);  // the other's share: 0.1 * 0.18 / (0.9 * 0.72 * 600 * 22.4) = 2e-6
+  EXPECT_NEAR(Sum(belief), 1, 1e-12);
+}
+
+TEST(PoseBelief, WhatIsNoLookIsLeftOutOfTheOthers) {
+  const PossiblePlace good = Place(2, 2, 0.5, 0.7), last = Place(5, 5, 0, 0.2);
+  PossiblePlace no_covariance = Place(1, 1, 0, 0.5);
+  no_covariance.covariance(1, 1) = NAN;
+  for (const PossiblePlace& bad : {Place(NAN, 1, 0, 0.5), Place(1, 1, INFINITY, 0.5), Place(1, 1, 0, NAN),
+                                   Place(1, 1, 0, -0.5), Place(1, 1, 0, INFINITY), no_covariance}) {
+    PoseBelief with(kAreaM2), without(kAreaM2);
+    with.Update(std::vector{good, bad, last});
+    without.Update(std::vector{good, last});
+    ASSERT_EQ(with.places().size(), 2u);
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(with.places()[i].pose.position, without.places()[i].pose.position);
+      EXPECT_EQ(with.places()[i].probability, without.places()[i].probability);
+    }
+    EXPECT_EQ(with.elsewhere(), without.elsewhere());
+  }
+}
+
+// Four standard deviations of both: 4 sqrt(0.01 + 0.01) = 0.566.
+TEST(PoseBelief, PlacesAreCorrectedByWhatIsNear) {
+  const auto x_after = [](double seen_x, double variance) {
+    PossiblePlace place = Place(1, 1, 0, 0.6), seen = Place(seen_x, 1, 0, 0.9);
+    place.covariance = seen.covariance = variance * Eigen::Matrix3d::Identity();
+    PoseBelief belief(kAreaM2);
+    belief.Update(std::vector{place});
+    belief.Correct(std::vector{seen});
+    return belief.places()[0].pose.position.x();
+  };
+  EXPECT_NEAR(x_after(1.56, 0.01), 1.28, 1e-12);
+  EXPECT_EQ(x_after(1.57, 0.01), 1);
+  EXPECT_EQ(x_after(3, 0.125), 1);  // just not: 2^2 / 0.25 = 16
+}
+
+TEST(PoseBelief, ACorrectedPlaceIsKnownAsWellAsTheBetterOfBoth) {
+  for (const double seen_sigma : {0.05, 0.2}) {
+    PoseBelief belief(kAreaM2);
+    belief.Update(std::vector{Place(1, 1, 0, 0.6, 0.1)});
+    belief.Correct(std::vector{Place(1.1, 1, 0, 0.9, seen_sigma)});
+    EXPECT_NEAR(belief.places()[0].covariance(0, 0), std::pow(std::min(0.1, seen_sigma), 2), 1e-15);
+  }
+}
+
+// A place is corrected by what is likeliest there: by its probability and by how near it is.
+TEST(PoseBelief, TheLikeliestOfWhatIsNearCorrects) {
+  PoseBelief before(kAreaM2);
+  before.Update(std::vector{Place(1, 1, 0, 0.6)});
+  // exp(-d^2 / 0.04) of each: 0.01 * 0.9, 0.4 * 0.37, 0.5 * 0.1.
+  const std::vector<PossiblePlace> seen = {Place(1.06, 1, 0, 0.01), Place(0.8, 1, 0, 0.4),
+                                           Place(1.3, 1, 0, 0.5)};
+  std::vector<int> order = {0, 1, 2};
+  do {
+    PoseBelief belief = before;
+    belief.Correct(std::vector{seen[order[0]], seen[order[1]], seen[order[2]]});
+    EXPECT_NEAR(belief.places()[0].pose.position.x(), 0.9, 1e-12);
+  } while (std::next_permutation(order.begin(), order.end()));
+}
+
+TEST(PoseBelief, OptionsHaveTheirRanges) {
+  PoseBeliefOptions options;
+  const auto is_allowed = [&] { return CheckOptions(DescribeOptions(&options)).ok(); };
+  for (double* ratio : {&options.surprise_ratio, &options.lost_ratio, &options.least_probability}) {
+    const double usual = *ratio;
+    *ratio = 0.5;
+    EXPECT_TRUE(is_allowed());
+    *ratio = 0.51;
+    EXPECT_FALSE(is_allowed());
+    *ratio = 0;
+    EXPECT_FALSE(is_allowed());
+    *ratio = usual;
+  }
+  options.max_num_places = 1;
+  EXPECT_TRUE(is_allowed());
+  options.max_num_places = 0;
+  EXPECT_FALSE(is_allowed());
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "runtime/belief/robot_on_plan.h"
 
 #include <memory>
+#include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
@@ -144,8 +146,52 @@ TEST(RobotOnPlan, ProbabilitiesOfPlacesAreAtMostOneInAll) {
   EXPECT_TRUE(robot.SeePlaces(std::vector{At({{1, 3}, 0}, 0.5), At({{5, 1}, 0}, 0.5)}).ok());
   EXPECT_EQ(robot.SeePlaces(std::vector{At({{1, 3}, 0}, 0.6), At({{5, 1}, 0}, 0.6)}).error().code,
             ErrorCode::kInvalidArgument);
-  EXPECT_EQ(RobotOnPlan::Make(Room(), {.laser_ahead_m = 11}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(RobotOnPlan::Make(Room(), {.laser_ahead_m = 10.5}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(RobotOnPlan::Make(Room(), {.laser_turn_deg = -180.5}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(RobotOnPlan::Make(Room(), {.camera_turn_deg = 180.5}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(RobotOnPlan::Make(Room(), {.camera_turn_deg = NAN}).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(RobotOnPlan, PlacesAreCheckedOneByOne) {
+  using testing::HasSubstr;
+  RobotOnPlan robot = *RobotOnPlan::Make(Room());
+  const auto refusal = [&](const PossiblePlace& place) {
+    const Status status = robot.SeePlaces(std::vector{At({{1, 3}, 0}, 0.1), place});
+    EXPECT_FALSE(status.ok());
+    EXPECT_TRUE(robot.Places().empty());
+    return status.ok() ? std::string() : status.error().message;
+  };
+  EXPECT_THAT(refusal(At({{NAN, 3}, 0}, 0.1)), HasSubstr("place 1 has a number that is not finite"));
+  EXPECT_THAT(refusal(At({{1, 3}, INFINITY}, 0.1)), HasSubstr("place 1 has a number that is not finite"));
+  EXPECT_THAT(refusal(At({{1, 3}, 0}, 1.5)), HasSubstr("place 1 has a probability of 1.5; expected 0 to 1"));
+  EXPECT_THAT(refusal(At({{1, 3}, 0}, -0.1)),
+              HasSubstr("place 1 has a probability of -0.1; expected 0 to 1"));
+  EXPECT_THAT(refusal(At({{1, 3}, 0}, NAN)), HasSubstr("place 1 has a probability of nan; expected 0 to 1"));
+  PossiblePlace place = At({{1, 3}, 0}, 0.1);
+  place.covariance(1, 2) = NAN;
+  EXPECT_THAT(refusal(place), HasSubstr("place 1 has a number that is not finite"));
+  place.covariance = Eigen::Matrix3d::Zero();
+  EXPECT_THAT(refusal(place), HasSubstr("some direction has no variance"));
+  place.covariance = Eigen::Vector3d(0.01, 0.02, 0).asDiagonal();
+  EXPECT_THAT(refusal(place), HasSubstr("some direction has no variance"));
+  // Of 0.01 by 1e-4, which is far more than rounding.
+  place.covariance = 0.01 * Eigen::Matrix3d::Identity();
+  place.covariance(0, 1) = 1e-6;
+  EXPECT_THAT(refusal(place), HasSubstr("it is not symmetric"));
+  place.covariance(0, 1) = 5e-9;
+  place.probability = 0;
+  EXPECT_TRUE(robot.SeePlaces(std::vector{place}).ok());
+}
+
+TEST(RobotOnPlan, PosesOfWheelsAreFinite) {
+  RobotOnPlan robot = *RobotOnPlan::Make(Room());
+  ASSERT_TRUE(robot.SeePlaces(std::vector{At({{1, 3}, 0})}).ok());
+  ASSERT_TRUE(robot.MoveTo({{5, 5}, 0}).ok());
+  EXPECT_EQ(robot.MoveTo({{NAN, 5}, 0}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(robot.MoveTo({{5, 5}, INFINITY}).error().code, ErrorCode::kInvalidArgument);
+  // The pose before is that of the last call which was right.
+  ASSERT_TRUE(robot.MoveTo({{5.5, 5}, 0}).ok());
+  EXPECT_TRUE(robot.Places()[0].pose.position.isApprox(Eigen::Vector2d(1.5, 3)));
 }
 
 }  // namespace
