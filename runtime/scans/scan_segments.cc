@@ -27,7 +27,7 @@ std::vector<Points> Runs(const RangeScan& scan, const ScanSegmentsOptions& optio
       continue;
     }
     const double angle = scan.AngleOf(i);
-    const double step = scan.angles_rad.empty() ? scan.step_rad : std::abs(WrapAngle(angle - last_angle));
+    const double step = std::abs(scan.angles_rad.empty() ? scan.step_rad : WrapAngle(angle - last_angle));
     const Vec2 point = range * Vec2(std::cos(angle), std::sin(angle));
     // A wall seen at 10 degrees has its points this much farther apart than its range times the step.
     constexpr double kGrazing = 5.8;
@@ -165,8 +165,10 @@ std::vector<ScanSegment> FindScanSegments(const RangeScan& scan, const ScanSegme
       }
       stretches.push_back(std::move(points));
     }
-    for (const Points& points : stretches) {
+    for (Points& points : stretches) {
       if (static_cast<int>(points.size()) < std::max(2, options.min_num_points)) continue;
+      // A laser that turns clockwise saw them the other way round.
+      if (Cross(points[0], points[1]) < 0) std::reverse(points.begin(), points.end());
       const ScanSegment segment = FitSegment(points, options.sigma_range_m);
       // The robot cannot see a line through itself.
       if (segment.Length() < std::max(1e-6, options.min_length_m) || Cross(segment.start, segment.end) <= 0)

@@ -107,5 +107,16 @@ TEST(ReadScans, ScansOfSegmentsHaveBeamsToThem) {
   EXPECT_GT(views->at(0).beams.size(), 100u);
 }
 
+TEST(Beams, ToSegmentsAreInTheMiddlesOfTheirSteps) {
+  const auto angle = [](const Beam& beam) { return std::atan2(beam.direction.y(), beam.direction.x()); };
+  // From 45 to 76 degrees of a wall to the left: 30 beams, none beyond its nearer end.
+  const std::vector<Beam> beams = BeamsTo({{{2, 2}, {0.5, 2}}});
+  ASSERT_EQ(beams.size(), 30u);
+  const double step = (std::atan2(2, 0.5) - std::atan2(2, 2)) / 30;
+  for (int i = 0; i < 30; ++i) EXPECT_NEAR(angle(beams[i]), std::atan2(2, 2) + (i + 0.5) * step, 1e-12);
+  // 178.85 degrees.
+  EXPECT_EQ(BeamsTo({{{100, 1}, {-100, 1}}}).size(), 178u);
+}
+
 }  // namespace
 }  // namespace cairn

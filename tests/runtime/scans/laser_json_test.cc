@@ -1,7 +1,11 @@
 #include "runtime/scans/laser_json.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
 
 #include "runtime/scans/read_scans.h"
 
@@ -109,6 +113,65 @@ TEST(LaserJson, WhatIsNoMessageIsRefusedByItsLine) {
   }
   EXPECT_EQ(ParseLaserJson("{\"data\": 1}\n", "log").error().code, ErrorCode::kNoData);
   EXPECT_EQ(ParseScans("{\"data\": 1}\n", "log", {}).error().code, ErrorCode::kNoData);
+}
+
+TEST(LaserJson, RangesBelowTheLeastAreLeftOut) {
+  const auto scans = ParseLaserJson(
+      Scan("0.1, 0.09, 8") + R"({"angle_min": 0, "angle_increment": 1, "range_max": 8, "ranges": [0.5]})",
+      "log");
+  ASSERT_TRUE(scans.ok()) << scans.error().message;
+  EXPECT_EQ((*scans)[0].ranges_m[0], 0.1);
+  EXPECT_TRUE(std::isnan((*scans)[0].ranges_m[1]));
+  EXPECT_EQ((*scans)[0].ranges_m[2], 8);
+  EXPECT_EQ((*scans)[1].ranges_m[0], 0.5);  // no least one is stated
+  EXPECT_EQ((*scans)[1].time_s, 0);
+}
+
+TEST(LaserJson, AStampHasBothItsParts) {
+  const auto scans = ParseLaserJson(Scan("1", R"(, "header": {"stamp": {"sec": 5}})") +
+                                        Scan("1", R"(, "header": {"stamp": {"nanosec": 5}})") +
+                                        Scan("1", R"(, "header": 5)"),
+                                    "log");
+  ASSERT_TRUE(scans.ok()) << scans.error().message;
+  for (const RangeScan& scan : *scans) EXPECT_EQ(scan.time_s, 0);
+}
+
+// The base may be tilted: its heading is that of its x on the floor.
+TEST(LaserJson, HeadingsAreThoseOfTiltedBasesToo) {
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(0.9, Eigen::Vector3d(2, -1, 3).normalized()));
+  const auto message = [&](double x, double y, double scale) {
+    return fmt::format(
+        R"({{"pose": {{"pose": {{"position": {{"x": {}, "y": {}}}, "orientation": {{"x": {}, "y": {}, "z": {}, "w": {}}}}}}}, "twist": {{}}}})",
+        x, y, scale * q.x(), scale * q.y(), scale * q.z(), scale * q.w());
+  };
+  const auto scans = ParseLaserJson(message(1, 2, 1) + "\n" + Scan("1"), "log");
+  ASSERT_TRUE(scans.ok()) << scans.error().message;
+  const Eigen::Vector3d ahead = q * Eigen::Vector3d::UnitX();
+  ASSERT_TRUE((*scans)[0].odometry);
+  EXPECT_EQ((*scans)[0].odometry->position, Eigen::Vector2d(1, 2));
+  EXPECT_NEAR((*scans)[0].odometry->heading_rad, std::atan2(ahead.y(), ahead.x()), 1e-9);
+  // Of a length of 1, but for rounding; and not farther away than anything.
+  EXPECT_TRUE(ParseLaserJson(message(-1e9, 1e9, std::sqrt(1.009)) + "\n" + Scan("1"), "log").ok());
+  for (const std::string& bad : {message(1, 2, std::sqrt(1.011)), message(1, 2, std::sqrt(0.989)),
+                                 message(-1.1e9, 2, 1), message(1, 1.1e9, 1)}) {
+    const auto refused = ParseLaserJson(Scan("1") + bad, "log");
+    ASSERT_FALSE(refused.ok()) << bad;
+    EXPECT_THAT(refused.error().message, HasSubstr("log: line 2: an Odometry at ("));
+  }
+}
+
+TEST(LaserJson, LongListsAndLinesHaveAnEnd) {
+  std::string most;
+  for (int i = 0; i < kMaxBeams; ++i) most += i == 0 ? "1" : ",1";
+  EXPECT_TRUE(ParseLaserJson(Scan(most), "log").ok());
+  EXPECT_TRUE(
+      ParseLaserJson(R"({"angle_min": 0, "angle_increment": 1, "range_max": 1e5, "ranges": [1]})", "log")
+          .ok());
+  EXPECT_THAT(ParseLaserJson(Scan(most + ",1"), "log").error().message,
+              HasSubstr("no list of up to 100000 numbers"));
+  // Of a line that is no message its beginning is said.
+  EXPECT_THAT(ParseLaserJson("  " + std::string(79, 'x') + "yz\n", "log").error().message,
+              HasSubstr('"' + std::string(79, 'x') + "y\" is no message"));
 }
 
 }  // namespace

@@ -101,5 +101,22 @@ TEST(RangeScan, WhatCannotBeIsRefused) {
   EXPECT_TRUE(CheckRangeScan(scan).ok());
 }
 
+TEST(RangeScan, BeamsSweepATurnAndALittleAtMost) {
+  RangeScan scan = AWall();
+  scan.step_rad = 1.005 * 2 * std::numbers::pi / 120;
+  EXPECT_TRUE(CheckRangeScan(scan).ok());
+  scan.step_rad = 1.02 * 2 * std::numbers::pi / 120;
+  EXPECT_FALSE(CheckRangeScan(scan).ok());
+  scan.step_rad = 0.01;
+  scan.max_range_m = 0.5;
+  EXPECT_TRUE(CheckRangeScan(scan).ok());
+  // Two beams look two ways.
+  scan = AWall();
+  scan.ranges_m = {1, 2};
+  EXPECT_TRUE(CheckRangeScan(scan).ok());
+  scan.step_rad = 0;
+  EXPECT_FALSE(CheckRangeScan(scan).ok());
+}
+
 }  // namespace
 }  // namespace cairn

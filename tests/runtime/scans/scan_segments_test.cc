@@ -2,11 +2,13 @@
 
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/geometry/pose.h"
 #include "runtime/scans/carmen_log.h"
 #include "runtime/scans/read_scans.h"
 
@@ -211,6 +213,269 @@ TEST(ReadScans, SegmentsAreTurnedSoThatTheRobotSeesThem) {
     EXPECT_THAT(refused.error().message, HasSubstr("scan: line 1: "));
   }
   EXPECT_EQ(ParseScans("\n", "scan", {}).error().code, ErrorCode::kNoData);
+}
+
+// By hand: scatter 2 along the line and 0.06 across it, of three points.
+TEST(ScanSegments, ALineIsFittedToThreePoints) {
+  const std::vector<Vec2> points = {{4, 5}, {3, 5.3}, {2, 5}};
+  const ScanSegment line = FitSegment(points, 0.01);
+  EXPECT_NEAR((line.start - Vec2(4, 5.1)).norm(), 0, 1e-12);
+  EXPECT_NEAR((line.end - Vec2(2, 5.1)).norm(), 0, 1e-12);
+  const double sigma = std::sqrt(0.06);  // by its residuals, one degree of freedom
+  EXPECT_NEAR(line.sigma_end_m, sigma, 1e-12);
+  EXPECT_NEAR(line.sigma_offset_m, sigma / std::sqrt(3), 1e-12);
+  EXPECT_NEAR(line.sigma_angle_rad, sigma / std::sqrt(2), 1e-12);
+  EXPECT_EQ(line.num_points, 3);
+  EXPECT_NEAR(FitSegment(points, 0.5).sigma_offset_m, 0.5 / std::sqrt(3), 1e-12);
+  // Two points have no residuals.
+  EXPECT_NEAR(FitSegment({{4, 5}, {3, 5.3}}, 0.01).sigma_end_m, 0.01, 1e-12);
+}
+
+// Points of a wall at x = 3, each so far behind it, one a degree.
+RangeScan UnevenWall(const std::vector<double>& offsets_m) {
+  RangeScan scan{.first_angle_rad = -static_cast<double>(offsets_m.size() - 1) / 2 * std::numbers::pi / 180,
+                 .step_rad = std::numbers::pi / 180};
+  for (size_t i = 0; i < offsets_m.size(); ++i)
+    scan.ranges_m.push_back((3 + offsets_m[i]) / std::cos(scan.AngleOf(i)));
+  return scan;
+}
+
+TEST(ScanSegments, NeighboursThatOneLineFitsAreOne) {
+  // The middle is 65 mm from the line through the ends, which divides the wall; of the line that fits all
+  // nothing is farther than 40 mm.
+  std::vector<double> offsets(41, 0);
+  offsets[0] = offsets[40] = 0.04;
+  offsets[20] = -0.025;
+  auto segments = FindScanSegments(UnevenWall(offsets), {});
+  ASSERT_EQ(segments.size(), 1u);
+  EXPECT_EQ(segments[0].num_points, 41);
+  // As much apart, but 55 mm from what would fit all: more than three quarters of 60.  The middle belongs to
+  // the first.
+  offsets[0] = offsets[40] = 0.055;
+  offsets[20] = -0.01;
+  segments = FindScanSegments(UnevenWall(offsets), {});
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_EQ(segments[0].num_points, 21);
+  EXPECT_EQ(segments[1].num_points, 20);
+}
+
+TEST(ScanSegments, APointDividesAWallThatIsFarEnoughFromIt) {
+  std::vector<double> offsets(41, 0);
+  offsets[20] = 0.058;
+  EXPECT_EQ(FindScanSegments(UnevenWall(offsets), {}).size(), 1u);
+  offsets[20] = 0.062;
+  EXPECT_EQ(FindScanSegments(UnevenWall(offsets), {}).size(), 2u);
+  // Of three points, too.
+  const auto segments =
+      FindScanSegments(UnevenWall({0, 0.5, 0}), {.max_gap_m = 10, .min_num_points = 2, .min_length_m = 0});
+  ASSERT_EQ(segments.size(), 1u);
+  EXPECT_EQ(segments[0].num_points, 2);
+}
+
+TEST(ScanSegments, ShortOnesAreLeftOut) {
+  EXPECT_EQ(FindScanSegments(UnevenWall(std::vector<double>(7, 0)), {}).size(), 1u);  // 31 cm
+  EXPECT_EQ(FindScanSegments(UnevenWall(std::vector<double>(7, 0)), {.min_length_m = 0.32}).size(), 0u);
+  const ScanSegmentsOptions any_length{.min_length_m = 0};
+  EXPECT_EQ(FindScanSegments(UnevenWall(std::vector<double>(6, 0)), any_length).size(), 1u);
+  EXPECT_EQ(FindScanSegments(UnevenWall(std::vector<double>(5, 0)), any_length).size(), 0u);
+  EXPECT_EQ(FindScanSegments(UnevenWall({0, 0}), {.min_num_points = 1, .min_length_m = 0}).size(), 1u);
+}
+
+// A wall a metre to the left that goes on for 30 m: the lower the angle at which it is seen, the farther are
+// its points apart.
+TEST(ScanSegments, AWallIsFollowedToALowAngle) {
+  RangeScan scan{.first_angle_rad = RadFromDeg(2), .step_rad = RadFromDeg(0.5)};
+  for (int i = 0; i <= 176; ++i) scan.ranges_m.push_back(1 / std::sin(scan.AngleOf(i)));
+  RangeScan stated{.ranges_m = scan.ranges_m};
+  for (int i = 0; i <= 176; ++i) stated.angles_rad.push_back(scan.AngleOf(i));
+  const auto farthest = [](const RangeScan& of, double max_gap_m) {
+    const auto segments = FindScanSegments(of, {.max_range_m = 50, .max_gap_m = max_gap_m});
+    return segments.empty() ? 0 : segments.back().start.x();
+  };
+  const auto x_at = [&](int i) { return 1 / std::tan(scan.AngleOf(i)); };
+  int by_angle = 176, by_gap = 176;
+  // 5.8 = 1 / sin(10 degrees): so many times its range times the step.
+  while (x_at(by_angle - 1) - x_at(by_angle) <= 5.8 * scan.ranges_m[by_angle] * scan.step_rad) --by_angle;
+  while (x_at(by_gap - 1) - x_at(by_gap) <= 0.5) --by_gap;
+  EXPECT_NEAR(DegFromRad(scan.AngleOf(by_angle)), 10, 0.51);
+  EXPECT_NEAR(farthest(scan, 1e-3), x_at(by_angle), 1e-9);
+  EXPECT_NEAR(farthest(stated, 1e-3), x_at(by_angle), 1e-9);
+  EXPECT_LT(by_gap, by_angle);
+  EXPECT_NEAR(farthest(scan, 0.5), x_at(by_gap), 1e-9);
+}
+
+// A wall 20 cm ahead, and a beam in the middle that measured nothing.
+TEST(ScanSegments, ABeamWithoutARangeDividesAWall) {
+  RangeScan scan = UnevenWall(std::vector<double>(41, -2.8));
+  EXPECT_EQ(FindScanSegments(scan, {.min_length_m = 0.02}).size(), 1u);
+  scan.ranges_m[20] = 0;
+  const auto segments = FindScanSegments(scan, {.min_length_m = 0.02});
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_EQ(segments[0].num_points, 20);
+  EXPECT_EQ(segments[1].num_points, 20);
+}
+
+// A laser that turns clockwise, or stands upside down, sees the same walls.
+TEST(ScanSegments, ClockwiseScansHaveTheSameSegments) {
+  const RangeScan scan =
+      Measure({{{3, -2}, {3, 0}}, {{3, 1}, {3, 2}}, {{3, 2}, {-1, 2}}, {{1.2, -1}, {6, -1.05}}}, 0.005, 1);
+  RangeScan clockwise{.first_angle_rad = scan.AngleOf(359), .step_rad = -scan.step_rad}, stated;
+  clockwise.ranges_m.assign(scan.ranges_m.rbegin(), scan.ranges_m.rend());
+  stated.ranges_m = clockwise.ranges_m;
+  for (int i = 359; i >= 0; --i) stated.angles_rad.push_back(scan.AngleOf(i));
+  const auto expected = FindScanSegments(scan, {});
+  ASSERT_EQ(expected.size(), 4u);
+  for (const RangeScan& turned : {clockwise, stated}) {
+    const auto segments = FindScanSegments(turned, {});
+    ASSERT_EQ(segments.size(), 4u);
+    for (int i = 0; i < 4; ++i) {
+      // A point between two stretches belongs to the first that is met.
+      EXPECT_NEAR((segments[3 - i].start - expected[i].start).norm(), 0, 0.07);
+      EXPECT_NEAR((segments[3 - i].end - expected[i].end).norm(), 0, 0.07);
+      EXPECT_GT(segments[i].start.x() * segments[i].end.y() - segments[i].start.y() * segments[i].end.x(), 0);
+    }
+  }
+}
+
+TEST(ScanSegments, OptionsHaveTheirRanges) {
+  ScanSegmentsOptions options;
+  const auto is_allowed = [&] { return CheckOptions(DescribeOptions(&options)).ok(); };
+  for (const auto& [value, least, most] :
+       {std::tuple<double*, double, double>{&options.max_range_m, 0.01, 1e4},
+        {&options.sigma_range_m, 1e-6, 10},
+        {&options.split_m, 1e-6, 10},
+        {&options.max_gap_m, 1e-3, 100},
+        {&options.min_length_m, 0, 100}}) {
+    const double usual = *value;
+    for (const double allowed : {least, most}) {
+      *value = allowed;
+      EXPECT_TRUE(is_allowed()) << allowed;
+    }
+    for (const double refused : {least == 0 ? -0.01 : 0.9 * least, 1.01 * most}) {
+      *value = refused;
+      EXPECT_FALSE(is_allowed()) << refused;
+    }
+    *value = usual;
+  }
+  options.min_num_points = 2;
+  EXPECT_TRUE(is_allowed());
+  options.min_num_points = 1;
+  EXPECT_FALSE(is_allowed());
+}
+
+std::string Repeated(const std::string& word, int num) {
+  std::string words;
+  for (int i = 0; i < num; ++i) words += word + " ";
+  return words;
+}
+
+TEST(CarmenLog, BeamsAreOverHalfATurn) {
+  // Even: a step less than half a turn; odd: all of it.
+  for (const auto& [num_beams, step_deg] :
+       {std::pair(1, 180.0), {2, 90.0}, {3, 90.0}, {5, 45.0}, {180, 1.0}, {181, 1.0}}) {
+    const auto scans =
+        Scans(fmt::format("FLASER {} {} 1 2 0.5 1 2 0.5 7\n", num_beams, Repeated("3", num_beams)));
+    ASSERT_EQ(scans.size(), 1u);
+    EXPECT_DOUBLE_EQ(scans[0].first_angle_rad, -std::numbers::pi / 2);
+    EXPECT_DOUBLE_EQ(scans[0].step_rad, RadFromDeg(step_deg)) << num_beams;
+  }
+}
+
+TEST(CarmenLog, LinesHaveAllTheirWords) {
+  const auto is_read = [](const std::string& line) { return ParseCarmenLog(line + "\n", "log").ok(); };
+  const std::string head = "ROBOTLASER1 4 -1.2 2.4 0.02 30 0.01 0",
+                    poses = " 1 2 0.5 0.9 1.9 0.5 0 0 0 0 0 7.25 host";
+  // Without the host and the time of the logger a FLASER line is a scan.
+  EXPECT_TRUE(is_read("FLASER 2 3 3 1 2 0.5 1 2 0.5 7"));
+  EXPECT_FALSE(is_read("FLASER 2 3 3 1 2 0.5 1 2 0.5"));
+  EXPECT_FALSE(is_read("FLASER 0 1 2 0.5 1 2 0.5 7 h 7"));
+  EXPECT_FALSE(is_read("FLASER -1 1 2 0.5 1 2 0.5 7 h 7"));
+  EXPECT_FALSE(is_read("FLASER "));
+  EXPECT_TRUE(is_read(head + " 1 4 2 10 11" + poses + " 7.5"));
+  EXPECT_FALSE(is_read(head + " 1 4 2 10 11" + poses));
+  EXPECT_FALSE(is_read(head + " 1 4 3 10 11" + poses + " 7.5"));
+  EXPECT_FALSE(is_read(head));
+  EXPECT_FALSE(is_read(head + " 1 4"));
+  EXPECT_FALSE(is_read("ROBOTLASER1 4 1e308 2.4 0.02 30 0.01 0 1 4 0" + poses + " 7.5"));
+  EXPECT_TRUE(is_read("ROBOTLASER1 4 -1.2 2.4 -0.02 30 0.01 0 1 4 0" + poses + " 7.5"));
+  EXPECT_THAT(ParseCarmenLog("ROBOTLASER1 4 -1.2 2.4 1e308 30 0.01 0 1 4 0" + poses + " 7.5\n", "log")
+                  .error()
+                  .message,
+              HasSubstr("log: line 1: angles from -1.2 rad on, 1e308 rad apart"));
+  EXPECT_FALSE(is_read("ODOM 1 2\nFLASER 1 3 1 2 0.5 1 2 0.5 7"));
+  EXPECT_TRUE(is_read("ODOM 1 2 3\nFLASER 1 3 1 2 0.5 1 2 0.5 7"));
+  ExpectOdometry(
+      Scans("PARAM robot_frontlaser_offset 0.5\nODOM 1 2 0 0 0 0 1 h 1\nFLASER 1 2 7 8 0 7 8 0 1 h 1\n")[0],
+      1.5, 2, 0);
+}
+
+TEST(CarmenLog, ScansHaveUpToAHundredThousandBeams) {
+  const std::string most = Repeated("3", 100000), poses = " 1 2 0.5 0.9 1.9 0.5 0 0 0 0 0 7.25 host 7.5\n",
+                    robot = "ROBOTLASER1 4 -1.2 2.4 0.02 30 0.01 0 ";
+  EXPECT_TRUE(ParseCarmenLog("FLASER 100000 " + most + " 1 2 0.5 1 2 0.5 7\n", "log").ok());
+  EXPECT_FALSE(ParseCarmenLog("FLASER 100001 3 " + most + " 1 2 0.5 1 2 0.5 7\n", "log").ok());
+  EXPECT_TRUE(ParseCarmenLog(robot + "100000 " + most + "0" + poses, "log").ok());
+  EXPECT_FALSE(ParseCarmenLog(robot + "100001 3 " + most + "0" + poses, "log").ok());
+  EXPECT_TRUE(ParseCarmenLog(robot + "1 3 100000 " + most + poses, "log").ok());
+  EXPECT_FALSE(ParseCarmenLog(robot + "1 3 100001 3 " + most + poses, "log").ok());
+}
+
+TEST(CarmenLog, ALaserMaySeeLessThanAMetre) {
+  EXPECT_EQ(Scans("FLASER 20 " + Repeated("0.5", 20) + "1 2 0.5 1 2 0.5 7\n").at(0).max_range_m, 0.5);
+}
+
+TEST(CarmenLog, MessagesWithoutATimeAreAsLateAsTheOneBefore) {
+  const std::string scan = "FLASER 1 2 7 8 0 7 8 0 ";
+  // Of 8 or 11 words, and of a time that is no number.
+  for (const std::string rest : {"0 0 4 h", "0 0 0 4 h 4 more", "0 0 0 nan h nan"}) {
+    const auto scans =
+        Scans("ODOM 0 0 0 0 0 0 2 h 2\nODOM 1 0 0 " + rest + "\n" + scan + "3 h 3\nODOM 3 0 0 0 0 0 4 h 4\n");
+    ExpectOdometry(scans.at(0), 2, 0, 0);
+  }
+  // The first at 0.
+  ExpectOdometry(Scans("ODOM 1 0 0\n" + scan + "0.5 h 1\nODOM 3 0 0 0 0 0 2 h 2\n").at(0), 1.5, 0, 0);
+  // Where no message has a time, 0 is no correction.
+  ExpectOdometry(Scans("ODOM 1 2 3\nODOM 2 2 3 0 0 0 0 h 0\n" + scan + "1 h 1\n").at(0), 2, 2, 3);
+  // A second is a time like others.
+  ExpectOdometry(Scans("ODOM 1 2 3 0 0 0 1 h 1\nODOM 2 2 3 0 0 0 0 h 0\n" + scan + "1 h 1\n").at(0), 1, 2, 3);
+}
+
+TEST(CarmenLog, ClocksMayDisagree) {
+  const std::string scan = "FLASER 1 2 7 8 0 7 8 0 ";
+  const auto at = [&](const std::string& time) {
+    return Scans("ODOM 0 0 0 0 0 0 5 h 5\n" + scan + time + " h 1\nODOM 1 0 0 0 0 0 5.5 h 5\n")
+        .at(0)
+        .odometry->position.x();
+  };
+  EXPECT_EQ(at("4"), 0);
+  EXPECT_NEAR(at("5.25"), 0.5, 1e-12);
+  EXPECT_EQ(at("7"), 1);
+  // Between two messages of one time: as before.
+  ExpectOdometry(Scans("ODOM 0 0 0 0 0 0 5 h 5\n" + scan + "6 h 6\nODOM 1 0 0 0 0 0 5 h 5\n").at(0), 0, 0, 0);
+}
+
+TEST(CarmenLog, WheelsDifferByAPlaceOrByAHeading) {
+  const std::string odometry = "ODOM 5 5 0 0 0 0 1 h 1\n";
+  ExpectOdometry(Scans(odometry + "FLASER 1 2 1 2 0.5 1 2 0.4 1 h 1\n").at(0), 1, 2, 0.4);
+  ExpectOdometry(Scans(odometry + "FLASER 1 2 1 2 0.5 1 3 0.5 1 h 1\n").at(0), 1, 3, 0.5);
+  ExpectOdometry(Scans(odometry + "FLASER 1 2 1 2 0.5 1 2 0.5 1 h 1\n").at(0), 5, 5, 0);
+}
+
+TEST(ReadScans, SegmentsHaveTheirBoundsAndTheirUsualErrors) {
+  const auto scans = ParseScans("100000,1,-100000,1\n3,-2,3,2\n", "scan", {.sigma_range_m = 0.02});
+  ASSERT_TRUE(scans.ok()) << scans.error().message;
+  EXPECT_EQ((*scans)[0].segments[1].sigma_offset_m, 0.02);
+  EXPECT_NEAR((*scans)[0].segments[1].sigma_angle_rad, 2 * 0.02 / 4, 1e-12);
+  for (const char* line : {"1,1,2,3,0.5,0", "1,1,2,3,0.5", "1,1,2,100001", "-100001,1,2,3", "0,0,2,3"})
+    EXPECT_EQ(ParseScans(line, "scan", {}).error().code, ErrorCode::kCorrupt) << line;
+  EXPECT_THAT(ParseScans("1,1,2,3,0,0.01", "scan", {}).error().message,
+              HasSubstr("standard deviations 0 and 0.01"));
+  const auto stated = ParseScans("1,-0.1,1,0.1,0.5,0.03\n", "scan", {});
+  EXPECT_EQ(stated->at(0).segments[0].start, Vec2(1, -0.1));
+  EXPECT_EQ(stated->at(0).segments[0].sigma_offset_m, 0.03);
+  // Of a long line its beginning is said.
+  EXPECT_THAT(ParseScans("  " + std::string(79, 'x') + "yz\n", "scan", {}).error().message,
+              HasSubstr('"' + std::string(79, 'x') + "y\" is not x0"));
 }
 
 }  // namespace
