@@ -54,7 +54,7 @@ struct BeamModel::Match {
   double off = 0;       // beyond the wall, along its normal, metres
   double weight = 0;    // Tukey's
   Eigen::Vector3d row;  // of `off` by the pose
-  double place = 0;     // along the wall, from its middle, metres
+  double place = 0;     // along the wall, from where the robot is beside it, metres
 };
 
 double BeamModel::WeighWithoutWalls(const std::vector<Beam>& beams) const {
@@ -117,8 +117,7 @@ void BeamModel::FindMatches(const std::vector<Beam>& beams, double sigma_m, cons
       behind += 0.5;
       if (std::abs(off) >= 3 * sigma_m || cost >= least) continue;
       least = cost;
-      best = {hit.wall, off, TukeyWeight(off, 3 * sigma_m), OffsetRow(normal, arm),
-              along.dot(pose.position + arm - 0.5 * (wall.start + wall.end))};
+      best = {hit.wall, off, TukeyWeight(off, 3 * sigma_m), OffsetRow(normal, arm), along.dot(arm)};
     }
     if (std::isfinite(least)) matches->push_back(best);
   }
