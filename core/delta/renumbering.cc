@@ -139,13 +139,8 @@ std::vector<int32_t> ReadOrigins(size_t num_from, int64_t max_num_elements, Blob
     } else if (code % 2 == 1) {
       origins.insert(origins.end(), length, Renumbering::kNew);
     } else {
-      const int64_t step = UnZigZag(reader->Varint());
+      next += UnZigZag(reader->Varint());  // a varint has 63 bits at most
       const auto limit = static_cast<int64_t>(num_from);
-      if (step < -limit || step > limit) {
-        reader->Fail();
-        break;
-      }
-      next += step;
       for (uint64_t i = 0; i < length && reader->ok(); ++i, ++next) {
         if (next < 0 || next >= limit || is_taken[next] != 0) {
           reader->Fail();
