@@ -17,8 +17,8 @@ constexpr double kQuaternionUnit = 1.0 / 2147483648.0;
 constexpr double kEqualUnits = 64;
 
 uint64_t EncodeAngle(double angle) {
-  const double code = std::round(angle / std::numbers::pi * kNumAngles) + (kNumAngles - 1) / 2.0;
-  return static_cast<uint64_t>(std::clamp(code, 0.0, kNumAngles - 1.0));
+  const int64_t code = std::llround(angle / std::numbers::pi * kNumAngles) + (kNumAngles - 1) / 2;
+  return static_cast<uint64_t>(std::clamp<int64_t>(code, 0, kNumAngles - 1));
 }
 
 double DecodeAngle(uint64_t code) {
@@ -144,9 +144,7 @@ bool ReadRuns(BlobReader* reader, int64_t limit, int64_t* max_num_values, std::v
     const uint64_t head = reader->Varint();
     const uint64_t longer = head % 2 == 1 ? reader->Varint() : 0;
     const uint64_t length = head % 2 == 1 ? longer + 2 : 1;
-    if (!reader->ok() || head / 2 >= static_cast<uint64_t>(limit) || longer >= static_cast<uint64_t>(limit)) {
-      return false;
-    }
+    if (!reader->ok() || longer >= static_cast<uint64_t>(limit)) return false;
     const int64_t begin = next + static_cast<int64_t>(head / 2);
     const int64_t end = begin + static_cast<int64_t>(length);
     *max_num_values -= static_cast<int64_t>(length);

@@ -133,10 +133,9 @@ std::array<int, kSiftDescriptorDim> CoefficientOrder() {
 // How large the levels are that are known around a coefficient: those of one frequency less in y, in x, in
 // both and in orientation, and, of a sine, the cosine's, twice.
 int SizeAround(const TransformLevels& levels, int coefficient) {
-  constexpr int kMost = 3;
   const int v = coefficient / (kNumCells * kNumOrientations), u = coefficient / kNumOrientations % kNumCells,
             f = coefficient % kNumOrientations;
-  const auto size = [&](int back) { return std::min<int>(kMost, std::abs(levels[coefficient - back])); };
+  const auto size = [&](int back) { return std::abs(levels[coefficient - back]); };
   int sum = 0;
   if (v > 0) sum += size(kNumCells * kNumOrientations);
   if (u > 0) sum += size(kNumOrientations);

@@ -7,7 +7,6 @@ namespace {
 
 constexpr int kProbabilityBits = 15;
 constexpr uint32_t kSmallestRange = 1u << 24;  // below it a byte is shifted out
-constexpr int32_t kLeastProbability = 64;      // of 2^16
 // A model is the mean of so many bits; then older ones count less and less.
 constexpr int32_t kMaxNumBits = 250;
 
@@ -17,8 +16,8 @@ void AdaptiveBit::Update(bool bit) {
   num_bits_ = std::min(num_bits_ + 1, kMaxNumBits);
   // (target - probability) / (num_bits + 1/2): the estimator of Krichevsky and Trofimov, 1981.
   const int32_t target = bit ? 0 : 1 << 16;
+  // It ends 2^16 / (2 * 250 + 2) away from the target or farther, as steps are rounded to 0.
   probability_ += 2 * (target - probability_) / (2 * num_bits_ + 1);
-  probability_ = std::clamp(probability_, kLeastProbability, (1 << 16) - kLeastProbability);
 }
 
 bool RangeEncoder::Bit(AdaptiveBit* model, bool bit) {

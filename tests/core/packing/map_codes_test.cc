@@ -80,6 +80,59 @@ TEST(MapCodes, ZeroAndFlatCovariancesAreKept) {
   EXPECT_NEAR(decoded(0, 2) / std::sqrt(decoded(0, 0) * decoded(2, 2)), -1, 1e-6);
 }
 
+// schemas/FORMAT.md draws the bits: three sizes of 8, three angles of 13, code 4095 for 0 degrees.
+TEST(MapCodes, CovarianceBitsAreThoseThatThePageDraws) {
+  const auto bits = [](uint64_t s1, uint64_t s2, uint64_t s3, uint64_t a, uint64_t b, uint64_t c) {
+    return s1 << 55 | s2 << 47 | s3 << 39 | a << 26 | b << 13 | c;
+  };
+  // 2, 4 and 8 um: an octave is 8 steps, and 1 um is 1.
+  const Eigen::Matrix3d straight = Eigen::Vector3d(4e-12, 16e-12, 64e-12).asDiagonal();
+  EXPECT_EQ(EncodeCovariance(straight), bits(9, 17, 25, 4095, 4095, 4095));
+  EXPECT_LT((DecodeCovariance(bits(9, 17, 25, 4095, 4095, 4095)) - straight).norm(), 1e-20);
+  // Angles of 30, -45 and 60 degrees: 180 degrees are 8191 codes.
+  const double degree = std::acos(-1) / 180;
+  const double a = 30 * degree, b = -45 * degree, c = 60 * degree;
+  Eigen::Matrix3d factor;
+  factor << 2e-6, 0, 0,                           //
+      4e-6 * std::sin(a), 4e-6 * std::cos(a), 0,  //
+      8e-6 * std::sin(b), 8e-6 * std::cos(b) * std::sin(c), 8e-6 * std::cos(b) * std::cos(c);
+  const Eigen::Matrix3d covariance = factor * factor.transpose();
+  const uint64_t code = bits(9, 17, 25, 4095 + 1365, 4095 - 2048, 4095 + 2730);
+  EXPECT_EQ(EncodeCovariance(covariance), code);
+  EXPECT_LT((DecodeCovariance(code) - covariance).norm(), 1e-3 * covariance.norm());
+  // +-90 degrees, where coordinates are exactly dependent, are taken for the outermost codes; one beyond is
+  // the last.
+  Eigen::Matrix3d flat;
+  flat << 4, -4, 4, -4, 4, -4, 4, -4, 4;
+  const uint64_t size = EncodeSize(2);
+  EXPECT_EQ(EncodeCovariance(flat), bits(size, size, size, 0, 8190, 4095));
+  EXPECT_EQ(DecodeCovariance(bits(9, 9, 9, 8191, 0, 4095)), DecodeCovariance(bits(9, 9, 9, 8190, 0, 4095)));
+  const double outermost = 4095 * std::acos(-1) / 8191;
+  EXPECT_NEAR(DecodeCovariance(bits(9, 9, 9, 8190, 4095, 4095))(0, 1), 4e-12 * std::sin(outermost), 1e-24);
+}
+
+// What a pivot of 0 is stated to have in common with others is left out, not divided by.
+TEST(MapCodes, ExactlyKnownCoordinatesHaveNothingInCommonWithOthers) {
+  Eigen::Matrix3d covariance;
+  covariance << 0, 1, 1, 1, 4, 2, 1, 2, 9;
+  const Eigen::Matrix3d decoded = DecodeCovariance(EncodeCovariance(covariance));
+  EXPECT_EQ(decoded(0, 0), 0);
+  EXPECT_EQ(decoded(0, 1), 0);
+  EXPECT_EQ(decoded(0, 2), 0);
+  EXPECT_NEAR(decoded(1, 2) / std::sqrt(decoded(1, 1) * decoded(2, 2)), 1 / std::sqrt(9), 1e-3);
+}
+
+TEST(MapCodes, SizesAreTheNearestStep) {
+  // 1 um 2^(k / 8): code k + 1 from half a step below to half a step above.
+  for (int k = 0; k <= 254; ++k) {
+    const double size = 1e-6 * std::pow(2, k / 8.0);
+    EXPECT_EQ(EncodeSize(size * std::pow(2, -0.49 / 8)), k + 1);
+    EXPECT_EQ(EncodeSize(size * std::pow(2, 0.49 / 8)), k + 1);
+    EXPECT_DOUBLE_EQ(DecodeSize(static_cast<uint8_t>(k + 1)), size);
+  }
+  EXPECT_EQ(EncodeSize(-1), 0);
+}
+
 TEST(MapCodes, RotationsKeepEightDigits) {
   Random random(3);
   for (int i = 0; i < 1000; ++i) {
@@ -117,6 +170,45 @@ TEST(MapCodes, EquallyLargePartsOfARotationAreWrittenAsTheSameAgain) {
     WriteRotation(ReadRotation(&reader), &again);
     EXPECT_EQ(again.Take(), bytes) << i;
   }
+}
+
+// The number of the largest, then the others in 2^-31, little-endian, with the sign that makes the largest
+// positive.
+TEST(MapCodes, RotationBytesAreThoseThatThePageDraws) {
+  const auto written = [](double w, double x, double y, double z) {
+    BlobWriter writer;
+    WriteRotation(Eigen::Quaterniond(w, x, y, z), &writer);
+    return writer.Take();
+  };
+  const std::string zero(4, '\0'), half("\0\0\0\x40", 4), less_half("\0\0\0\xc0", 4);
+  const double most = std::sqrt(0.75);
+  EXPECT_EQ(written(most, 0.5, 0, 0), '\0' + half + zero + zero);
+  EXPECT_EQ(written(-most, 0.5, 0, 0), '\0' + less_half + zero + zero);
+  EXPECT_EQ(written(0.5, -most, 0, 0), '\1' + less_half + zero + zero);
+  EXPECT_EQ(written(0, 0.5, most, 0), '\2' + zero + half + zero);
+  EXPECT_EQ(written(0, 0, -0.5, most), '\3' + zero + zero + less_half);
+  // Larger by up to 64 units is equally large, and the first is taken.
+  const double unit = std::pow(2, -31);
+  EXPECT_EQ(written(0.5, 0.5 + 64 * unit, 0, 0)[0], 0);
+  EXPECT_EQ(written(0.5, 0.5 + 65 * unit, 0, 0)[0], 1);
+  EXPECT_EQ(written(0.5, -0.5 - 64 * unit, 0, 0)[0], 0);
+  EXPECT_EQ(written(0.5, -0.5 - 65 * unit, 0, 0)[0], 1);
+}
+
+// The three that are not the largest: 1/2 each, and a little more as rounding may have it.
+TEST(MapCodes, RotationsOfFourEqualPartsMayBeALittleTooLong) {
+  const auto accepts = [](uint32_t more) {
+    BlobWriter writer;
+    writer.UInt8(2);
+    for (int i = 0; i < 3; ++i) writer.UInt32((1u << 30) + more);
+    const std::string bytes = writer.Take();
+    BlobReader reader(bytes);
+    ReadRotation(&reader);
+    return reader.ok();
+  };
+  EXPECT_TRUE(accepts(0));
+  EXPECT_TRUE(accepts(700));   // squares: 0.75 + 3 * 700 / 2^31, which is 0.98e-6
+  EXPECT_FALSE(accepts(730));  // 1.02e-6
 }
 
 TEST(MapCodes, RotationThatIsNoneIsRefused) {
@@ -168,6 +260,15 @@ TEST(MapCodes, RunsBeyondTheLimitAreRefused) {
   EXPECT_FALSE(accepts(Runs({3, 7, 8, 9}), 9, 4));
   EXPECT_FALSE(accepts(Runs({3, 7, 8, 9}), 10, 3));
   EXPECT_FALSE(accepts(Runs({3, 7, 8, 9}).substr(0, 3), 10, 4));
+  EXPECT_TRUE(accepts(Runs({9}), 10, 1));
+  EXPECT_FALSE(accepts(Runs({10}), 10, 1));
+  EXPECT_TRUE(accepts(Runs({}), 0, 0));
+  EXPECT_FALSE(accepts(Runs({0}), 10, 0));
+  EXPECT_FALSE(accepts({2, 0}, 10, 9));  // more runs than bytes
+  // A gap and a length that are negative as signed numbers.
+  const std::string huge = std::string(9, '\xfe') + '\1';
+  EXPECT_FALSE(accepts('\1' + huge, 10, 9));
+  EXPECT_FALSE(accepts("\1\1" + huge, 10, 9));
   EXPECT_FALSE(accepts(std::string("\xff\xff\xff\xff\xff\xff\xff\x7f"), 10, 4));
 }
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "tests/core/packing/page_decoder.h"
 
 namespace cairn {
 namespace {
@@ -53,6 +54,48 @@ TEST(RangeCoder, WhatWasWrittenIsReadAndNothingIsLeft) {
       }
       EXPECT_FALSE(cut.Finished());
     }
+  }
+}
+
+// Models that meet only zeros, only ones, and either for a long time, so that they come to count their last
+// 250 bits.
+TEST(RangeCoder, BitsAreThoseThatThePageDraws) {
+  Random random(3);
+  const double shares[] = {0, 1, 0.02, 0.3, 0.99};
+  RangeEncoder encoder;
+  AdaptiveBit models[5];
+  std::vector<std::vector<bool>> bits(5);
+  for (int i = 0; i < 3000; ++i) {
+    for (int k = 0; k < 5; ++k) {
+      // In the middle all of them change.
+      bits[k].push_back(random.Uniform() < (i > 1500 && i < 1700 ? 1 - shares[k] : shares[k]));
+      encoder.Bit(&models[k], bits[k].back());
+    }
+    encoder.Bits(3, static_cast<uint64_t>(i) % 8);
+  }
+  const std::string bytes = encoder.Take();
+  PageDecoder page(bytes);
+  for (int i = 0; i < 3000; ++i) {
+    for (int k = 0; k < 5; ++k) ASSERT_EQ(page.Bit("", {k}), bits[k][i]) << i << ' ' << k;
+    ASSERT_EQ(page.Bits(3), static_cast<uint64_t>(i) % 8);
+  }
+  EXPECT_TRUE(page.IsAtEnd());
+}
+
+// By hand: after n zeros a 1 has 1 / (2 n + 2) as by Krichevsky and Trofimov, rounded, and never less than
+// 2^-10.
+TEST(RangeCoder, ProbabilitiesStayWithinTheirLimits) {
+  for (const bool bit : {false, true}) {
+    AdaptiveBit model;
+    const auto other = [&] {
+      return bit ? model.probability_of_zero() : 32768 - model.probability_of_zero();
+    };
+    EXPECT_EQ(other(), 16384u);
+    model.Update(bit);
+    EXPECT_NEAR(other(), 32768 / 6.0, 2);  // 1/2 - 2/3 of 1/2
+    for (int i = 0; i < 1000; ++i) model.Update(bit);
+    EXPECT_GE(other(), 65u);  // 1 / (2 * 250 + 2) of 2^15; steps are rounded to 0 before that
+    EXPECT_LE(other(), 75u);
   }
 }
 
