@@ -198,9 +198,7 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   }
   int64_t class_id = 0;
   for (MapLandmark& landmark : block.landmarks) {
-    const int64_t step = UnZigZag(reader.Varint());
-    if (std::abs(step) > int64_t{kInvalidClassId}) return corrupt("the class ids");
-    class_id += step;
+    class_id += UnZigZag(reader.Varint());  // a varint has 63 bits at most
     if (class_id < 0 || class_id > kInvalidClassId) return corrupt("the class ids");
     landmark.class_id = static_cast<ClassId>(class_id);
   }
@@ -225,7 +223,7 @@ int64_t NumBytes(const LandmarkBlock& block) {
   num_bytes += static_cast<int64_t>(block.landmarks.size() * sizeof(MapLandmark));
   num_bytes += static_cast<int64_t>(block.image_blocks.size() * sizeof(int32_t));
   for (const auto& [region, landmarks] : block.regions) {
-    num_bytes += 40 + static_cast<int64_t>(landmarks.size() * sizeof(LandmarkIdx));
+    num_bytes += static_cast<int64_t>(sizeof(block.regions[0]) + landmarks.size() * sizeof(LandmarkIdx));
   }
   return num_bytes;
 }

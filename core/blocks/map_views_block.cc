@@ -16,14 +16,8 @@ void WriteStep(const GridPoint& point, GridPoint* before, BlobWriter* writer) {
 
 // A point off the grid makes the reader fail.
 GridPoint ReadStep(GridPoint* before, BlobReader* reader) {
-  const int64_t x = UnZigZag(reader->Varint()), y = UnZigZag(reader->Varint());
-  constexpr int64_t kMaxStep = 2 * kMaxGridCoordinate;
-  if (std::abs(x / 2) > kMaxStep || std::abs(y / 2) > kMaxStep) {
-    reader->Fail();
-    return {};
-  }
-  before->x += x;
-  before->y += y;
+  before->x += UnZigZag(reader->Varint());  // a varint has 63 bits at most
+  before->y += UnZigZag(reader->Varint());
   if (std::abs(before->x) > kMaxGridCoordinate || std::abs(before->y) > kMaxGridCoordinate) {
     reader->Fail();
     *before = {};
