@@ -22,8 +22,8 @@ constexpr double kFirstReach = 1.5;
 // A stretch of wall in the robot's frame that only one of two views has.
 struct Feature {
   Vec2 start, end;
-  double distance = 0;
-  bool is_at_a = false;
+  double distance;
+  bool is_at_a;
 };
 
 class Planner {
@@ -125,7 +125,7 @@ class Planner {
   }
   bool IsFreeAt(const PlanarPose& pose, const Vec2& from, const Vec2& to) const {
     const Vec2 end = pose.FloorFromRobot(to);
-    return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m) && space_.FaceAt(end) >= 0;
+    return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m);
   }
 
   // Straight to one metre before the feature, or as far as the way is free at both poses.

@@ -145,7 +145,7 @@ std::vector<size_t> FewSets(const std::vector<NumberSet>& sets, const std::vecto
   while (rest > (1 - least_share) * all) {
     size_t best = 0;
     double most = 0;
-    for (size_t i = 0; i < sets.size(); ++i) {
+    for (size_t i = 1; i < sets.size(); ++i) {
       NumberSet gain = sets[i];
       gain.KeepAll(left);
       const double weight = WeightOf(gain, weights);
@@ -153,7 +153,6 @@ std::vector<size_t> FewSets(const std::vector<NumberSet>& sets, const std::vecto
       most = weight;
       best = i;
     }
-    if (most <= 0) break;
     chosen.push_back(best);
     left.EraseAll(sets[best]);
     rest = WeightOf(left, weights);

@@ -88,7 +88,7 @@ void AppendArcs(const Vec2& start, const Vec2& end, double spare_start, double s
   from += spare_start;
   width -= spare_start + spare_end;
   if (!(width > 0)) return;
-  if (from > std::numbers::pi) from -= 2 * std::numbers::pi;
+  if (from >= std::numbers::pi) from -= 2 * std::numbers::pi;
   // To the last digit the angle of the end: segments that share it leave no gap.
   const double to = spare_end == 0 ? AngleOf(last) : from + width;
   if (to >= from && to <= std::numbers::pi) {
@@ -100,7 +100,7 @@ void AppendArcs(const Vec2& start, const Vec2& end, double spare_start, double s
 }
 
 Arcs NearestArcs(Arcs arcs) {
-  if (arcs.size() <= 1) return arcs;
+  if (arcs.empty()) return {};
   std::vector<Arcs> parts;
   parts.reserve(arcs.size());
   for (const BlockedArc& arc : arcs) parts.push_back({arc});

@@ -1,11 +1,13 @@
 #include "runtime/paths/fewest_looks.h"
 
+#include <algorithm>
 #include <bit>
 
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
 #include "tests/decompose_views/plan_fixture.h"
+#include "tests/runtime/paths/plan_oracle.h"
 
 namespace cairn {
 namespace {
@@ -48,6 +50,26 @@ TEST(FewSets, TakesOneInPlaceOfTwo) {
   const std::vector<NumberSet> other{SetOf({0, 1}), SetOf({2, 3, 4, 5}), SetOf({6, 7, 8, 9}),
                                      SetOf({2, 6, 10}), SetOf({3, 7, 11})};
   EXPECT_EQ(FewSets(other, std::vector<double>(12, 1), 1).size(), 5u);
+}
+
+TEST(FewSets, ExchangesUntilNoOneStandsForTwo) {
+  // Greed takes {1, 2} and {3, 4}, by the weight of 2 and 4, then {2, 5} and {4, 6}; {1, 3} stands for the
+  // first two.  The same again for 7 to 12.
+  const std::vector<NumberSet> sets{SetOf({0}),     SetOf({1, 2}),   SetOf({3, 4}), SetOf({2, 5}),
+                                    SetOf({4, 6}),  SetOf({1, 3}),   SetOf({7, 8}), SetOf({9, 10}),
+                                    SetOf({8, 11}), SetOf({10, 12}), SetOf({7, 9})};
+  const std::vector<double> weights{1, 1, 5, 1, 5, 0.5, 0.5, 1, 5, 1, 5, 0.5, 0.5};
+  std::vector<size_t> chosen = FewSets(sets, weights, 1);
+  std::sort(chosen.begin(), chosen.end());
+  EXPECT_EQ(chosen, (std::vector<size_t>{0, 3, 4, 5, 8, 9, 10}));
+}
+
+TEST(FewSets, LeavesOutTheNeedlessBeforeItExchanges) {
+  // The first choice, {1, 2, 3, 4}, is needless after the next two.  {1, 2, 5} would do for one of them and
+  // it.
+  const std::vector<NumberSet> sets{SetOf({0}), SetOf({1, 2, 3, 4}), SetOf({1, 2, 5}), SetOf({1, 2, 5, 7}),
+                                    SetOf({3, 4, 6, 7})};
+  EXPECT_EQ(FewSets(sets, {1, 1.5, 1.5, 1.5, 1.5, 1, 1, 1}, 1), (std::vector<size_t>{0, 3, 4}));
 }
 
 TEST(FewSets, HoldsAllAndIsNearTheLeast) {
@@ -124,6 +146,56 @@ TEST(LeastNumLooks, EachRoomNeedsOne) {
   EXPECT_EQ(LeastNumLooks(WitnessesAt(space, places), 0), 4);
   EXPECT_EQ(LeastNumLooks(WitnessesAt(space, {places[0], places[1]}), 0), 1);
   EXPECT_EQ(LeastNumLooks({}, 0), 0);
+}
+
+TEST(LeastNumLooks, TakesTwoInPlaceOfOne) {
+  // In the middles of eight rooms, which have no view in common but by their viewers.  Of each four: the
+  // first is taken, for it has the fewest viewers, and the second and the last two have one in common with
+  // it; the second has with the last two, which have none.
+  const Views views = decompose_views::Decomposed(Comb(8)).views;
+  const PlanSpace space(views);
+  std::vector<Witness> witnesses;
+  const auto add = [&](const std::vector<int>& viewers) {
+    const Vec2 middle(3 * static_cast<double>(witnesses.size()) + 1.5, 2);
+    witnesses.push_back({LookAround(space, middle), SetOf(viewers)});
+  };
+  for (const int i : {0, 20}) {
+    add({i, i + 1});
+    add({i, i + 1, i + 9});
+    add({i, i + 5, i + 6});
+    add({i + 1, i + 7, i + 8});
+  }
+  EXPECT_EQ(LeastNumLooks(witnesses, 0), 4);
+  witnesses.resize(4, witnesses[0]);
+  EXPECT_EQ(LeastNumLooks(witnesses, 0), 2);
+  witnesses.resize(2, witnesses[0]);
+  EXPECT_EQ(LeastNumLooks(witnesses, 0), 1);
+}
+
+TEST(HaveCommonView, IsFoundWhereBothSee) {
+  int num_common = 0, num_apart = 0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    Random random(MixSeed(42, seed));
+    const PlanOracle oracle(RandomWalls(random, 14, 5));
+    const Views views = decompose_views::Decomposed(oracle.Text()).views;
+    const PlanSpace space(views);
+    std::vector<Vec2> places;
+    for (int i = 0; i < 6; ++i) places.emplace_back(random.Uniform(-0.9, 5.9), random.Uniform(-0.9, 5.9));
+    const std::vector<Witness> witnesses = WitnessesAt(space, places);
+    const std::vector<Vec2> lattice = oracle.Lattice(0.37, 1e-3);
+    for (size_t i = 0; i < places.size(); ++i) {
+      for (size_t k = 0; k < i; ++k) {
+        const bool is_common = HaveCommonView(witnesses[i], witnesses[k], 0);
+        const bool both_see = std::any_of(lattice.begin(), lattice.end(), [&](const Vec2& point) {
+          return oracle.Sees(places[i], point) && oracle.Sees(places[k], point);
+        });
+        if (both_see) EXPECT_TRUE(is_common) << oracle.Text();
+        (is_common ? num_common : num_apart) += 1;
+      }
+    }
+  }
+  EXPECT_GT(num_common, 200);
+  EXPECT_GT(num_apart, 20);
 }
 
 TEST(HaveCommonView, OnlyOfPlacesWhereTheRobotFits) {

@@ -42,6 +42,14 @@ TEST(ConvexPiece, IsMeasuredAndCut) {
   }
 }
 
+TEST(ConvexPiece, CutThroughItsCornersHasNoneTwice) {
+  const ConvexPiece square{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  EXPECT_EQ(LeftOf(square, {0, 0}, {1, 1}), (ConvexPiece{{0, 0}, {1, 1}, {0, 1}}));
+  EXPECT_EQ(LeftOf(square, {0, 0}, {-1, -1}), (ConvexPiece{{0, 0}, {1, 0}, {1, 1}}));
+  // Without an area its middle is its first corner.
+  EXPECT_EQ(CentroidOf({{1, 1}, {2, 1}, {3, 1}}), Vec2(1, 1));
+}
+
 TEST(FloorPieces, CoverTheBoxOnceAndNoWallCrossesThem) {
   for (uint64_t seed = 0; seed < 60; ++seed) {
     Random random(MixSeed(31, seed));
@@ -97,6 +105,40 @@ TEST(LookAround, HidesWhatIsBehindAWall) {
   EXPECT_TRUE(look.Hidden({{{1, 1}, {1.9, 1}, {1.9, 3}, {1, 3}}}).empty());
   const ConvexPiece behind{{2.5, 1.5}, {3, 1.5}, {3, 2.5}, {2.5, 2.5}};
   EXPECT_EQ(look.Hidden({behind}), std::vector<ConvexPiece>{behind});
+}
+
+TEST(LookAround, HidesOfAPieceAroundThePlaceWhatIsBehindAWall) {
+  // As above, of the whole box, in which the place lies, and of what is right of it: a trapezoid.
+  const Views views = decompose_views::Decomposed("2,1,2,3\n0,0,0,0.5\n4,4,4,3.5").views;
+  const PlanSpace space(views);
+  const LookAround look(space, {0, 2});
+  for (const double left : {-1.0, 0.5}) {
+    const std::vector<ConvexPiece> hidden = look.Hidden({{{left, -1}, {5, -1}, {5, 5}, {left, 5}}});
+    EXPECT_NEAR(AreaOf(hidden), 0.5 * (2 + 5) * 3, 1e-6);
+    EXPECT_EQ(NumHolding(hidden, {4.9, 4}), 1);
+    EXPECT_EQ(NumHolding(hidden, {4.9, -0.3}), 1);
+  }
+}
+
+TEST(LookAround, WhatTwoWallsHideStaysWhole) {
+  const Views views = decompose_views::Decomposed("2,1,2,2.5\n2,2.5,2,3\n0,0,0,0.5\n4,4,4,3.5").views;
+  const LookAround look(PlanSpace(views), {0, 2});
+  const ConvexPiece behind{{2.5, 1.5}, {4, 1.5}, {4, 3}, {2.5, 3}};
+  EXPECT_EQ(look.Hidden({behind}), std::vector<ConvexPiece>{behind});
+}
+
+TEST(LookAround, LooksInAllDirectionsFromTheBorder) {
+  const Views views = decompose_views::Decomposed("1,1,2,2").views;
+  const PlanSpace space(views);
+  for (const double x : {0.0, 1.3, 3.0}) {
+    for (const double y : {0.0, 1.2, 3.0}) {
+      const std::vector<BlockedArc> arcs = LookAround(space, {x, y}).arcs();
+      EXPECT_EQ(arcs.front().from, -std::numbers::pi);
+      EXPECT_EQ(arcs.back().to, std::numbers::pi);
+      for (size_t i = 0; i + 1 < arcs.size(); ++i) EXPECT_NEAR(arcs[i].to, arcs[i + 1].from, 1e-9);
+      for (const BlockedArc& arc : arcs) EXPECT_GT(arc.Distance(0.5 * (arc.from + arc.to)), 0);
+    }
+  }
 }
 
 TEST(LookAround, WhatIsHiddenIsWhatIsNotSeen) {

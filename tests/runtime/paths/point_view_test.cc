@@ -48,7 +48,13 @@ TEST(PointView, HasTheNearestInEachDirection) {
       AppendArcs(start, end, 0, 0, &arcs);
     }
     const std::vector<BlockedArc> view = NearestArcs(arcs);
-    for (size_t i = 0; i + 1 < view.size(); ++i) EXPECT_LE(view[i].to, view[i + 1].from);
+    for (const BlockedArc& arc : view) EXPECT_LT(arc.from, arc.to);
+    for (size_t i = 0; i + 1 < view.size(); ++i) {
+      EXPECT_LE(view[i].to, view[i + 1].from);
+      // What is seen of a segment without interruption is one arc.
+      EXPECT_FALSE(view[i].to == view[i + 1].from && view[i].start == view[i + 1].start &&
+                   view[i].end == view[i + 1].end);
+    }
     for (int i = 0; i < 200; ++i) {
       const double angle = random.Uniform(-std::numbers::pi, std::numbers::pi);
       const auto arc = FirstArcFrom(view, angle);
@@ -79,6 +85,64 @@ TEST(PointView, SegmentsThatShareAnEndLeaveNoGap) {
   for (size_t i = 0; i + 1 < view.size(); ++i) EXPECT_EQ(view[i].to, view[i + 1].from);
 }
 
+TEST(PointView, OfTwoThatShareAnEndTheOneBeforeTheOtherIsSeen) {
+  // From (2, 0) up to 45 degrees, or from there down: on the axis both are exactly as near.
+  for (const double side : {1.0, -1.0}) {
+    for (const bool near_first : {false, true}) {
+      std::vector<BlockedArc> arcs;
+      if (near_first) AppendArcs({2, 0}, {1, side}, 0, 0, &arcs);
+      AppendArcs({2, 0}, {2, side * 2}, 0, 0, &arcs);
+      if (!near_first) AppendArcs({2, 0}, {1, side}, 0, 0, &arcs);
+      const std::vector<BlockedArc> view = NearestArcs(arcs);
+      ASSERT_EQ(view.size(), 1u);
+      EXPECT_NEAR(view[0].Distance(side * std::numbers::pi / 4), std::numbers::sqrt2, 1e-12);
+    }
+  }
+}
+
+TEST(PointView, WhereTwoCrossTheNearerOneChanges) {
+  //  x = 2 upwards, and from (2.5, -0.4) to (1.5, 0.4) over (2, 0): the turn from one to the other is 1.
+  for (const bool is_first : {false, true}) {
+    std::vector<BlockedArc> arcs;
+    if (is_first) AppendArcs({2, -0.5}, {2, 0.5}, 0, 0, &arcs);
+    AppendArcs({2.5, -0.4}, {1.5, 0.4}, 0, 0, &arcs);
+    if (!is_first) AppendArcs({2, -0.5}, {2, 0.5}, 0, 0, &arcs);
+    const std::vector<BlockedArc> view = NearestArcs(arcs);
+    ASSERT_EQ(view.size(), 2u);
+    EXPECT_EQ(view[0].end, Vec2(2, 0.5));
+    EXPECT_NEAR(view[0].to, 0, 1e-12);
+    EXPECT_EQ(view[1].end, Vec2(1.5, 0.4));
+  }
+}
+
+TEST(PointView, AnArcWithoutLengthIsNotSeen) {
+  const BlockedArc none{-2, -2, {-1, -2}, {-1, -2}}, arc{1, 2, {1, 2}, {-1, 2}};
+  EXPECT_EQ(NearestArcs({none, arc}).size(), 1u);
+  EXPECT_EQ(NearestArcs({arc, none}).size(), 1u);
+  EXPECT_EQ(NearestArcs({arc}).size(), 1u);
+  EXPECT_TRUE(NearestArcs({}).empty());
+}
+
+TEST(PointView, ADirectionBetweenTwoArcsIsTheFirstOnes) {
+  const std::vector<BlockedArc> view{{0, 1, {2, 0}, {1, 1}}, {1, 2, {1, 1}, {-1, 1}}};
+  EXPECT_EQ(FirstArcFrom(view, 1), view.begin());
+  EXPECT_EQ(FirstArcFrom(view, 1.01), view.begin() + 1);
+  EXPECT_EQ(FirstArcFrom(view, -1), view.begin());
+  EXPECT_EQ(FirstArcFrom(view, 2.01), view.end());
+}
+
+TEST(PointView, ASegmentThatEndsOrBeginsAtTheDirectionPiIsOneArc) {
+  std::vector<BlockedArc> arcs;
+  AppendArcs({0, 2}, {-2, 0}, 0, 0, &arcs);
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_EQ(arcs[0].to, std::numbers::pi);
+  arcs.clear();
+  AppendArcs({-2, 0}, {-2, -2}, 0, 0, &arcs);
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_EQ(arcs[0].from, -std::numbers::pi);
+  EXPECT_EQ(arcs[0].to, -0.75 * std::numbers::pi);
+}
+
 TEST(PointView, WhatIsSparedAtAnEndIsFree) {
   std::vector<BlockedArc> arcs;
   // Clockwise or counter-clockwise: what is spared first is at the end that comes first counter-clockwise.
@@ -93,6 +157,12 @@ TEST(PointView, WhatIsSparedAtAnEndIsFree) {
   ASSERT_EQ(arcs.size(), 2u);
   EXPECT_NEAR(arcs[0].from, 0.75 * std::numbers::pi + 0.1, 1e-12);
   EXPECT_NEAR(arcs[1].to, -0.75 * std::numbers::pi - 0.2, 1e-12);
+  // At an end that lies just before the direction pi; the whole arc is then behind it.
+  arcs.clear();
+  AppendArcs({-1, 0.05}, {-1, -1}, 0.1, 0, &arcs);
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_NEAR(arcs[0].from, -std::numbers::pi - std::atan(0.05) + 0.1, 1e-12);
+  EXPECT_EQ(arcs[0].to, -0.75 * std::numbers::pi);
   // Nothing is left, and what is in line with the place is not seen.
   arcs.clear();
   AppendArcs({1, 0.1}, {1, -0.1}, 0.1, 0.2, &arcs);
