@@ -134,6 +134,13 @@ TEST_F(Corridors, TheOrderOfThePlacesIsTheirs) {
 TEST_F(Corridors, ImprobablePlacesAreLeftOut) {
   const auto next = PlanNextLook(space_, Places(0.6, 0.005, 0.395), nullptr, options_, 1);
   EXPECT_THAT(next->hypotheses, ElementsAre(0, 2));
+  // Just probable enough; and not probable at all.
+  EXPECT_THAT(PlanNextLook(space_, Places(0.6, 0.01, 0.39), nullptr, options_, 1)->hypotheses,
+              ElementsAre(0, 2, 1));
+  EXPECT_THAT(PlanNextLook(space_, Places(0.5, 0, 0.5), nullptr,
+                           {.view_range_m = 4, .step_m = 0.25, .least_probability = 0}, 1)
+                  ->hypotheses,
+              ElementsAre(0, 2));
   const auto few = PlanNextLook(space_, Places(0.5, 0.3, 0.2), nullptr,
                                 {.view_range_m = 4, .step_m = 0.25, .max_num_hypotheses = 2}, 1);
   EXPECT_THAT(few->hypotheses, ElementsAre(0, 1));
@@ -175,6 +182,9 @@ TEST_F(Corridors, APlaceThatIsNotDeterminedIsSeveral) {
   EXPECT_NEAR(std::abs(next->places[1].pose.position.x() - 7), 0.75 * 1.5, 1e-9);
   EXPECT_NEAR(std::abs(next->places[3].pose.position.x() - 7), 1.5 * 1.5, 1e-9);
   EXPECT_NEAR(next->places[3].probability / next->places[0].probability, std::exp(-0.5 * 1.5 * 1.5), 1e-9);
+  EXPECT_NEAR(next->places[1].probability / next->places[0].probability, std::exp(-0.5 * 0.75 * 0.75), 1e-9);
+  EXPECT_NEAR(next->places[2].probability, next->places[1].probability, 1e-12);
+  EXPECT_NEAR(next->places[1].pose.position.x() + next->places[2].pose.position.x(), 2 * 7, 1e-9);
   // An end is in view from the outermost place after 0.75 m along the corridor, from all others of one half
   // after 3.75 m.
   EXPECT_GT(std::abs(next->path.back().x()), 0.7);
@@ -196,6 +206,26 @@ TEST_F(Corridors, ThreadsChangeNothing) {
   EXPECT_EQ(one->path, two->path);
   EXPECT_EQ(one->expected_length_m, two->expected_length_m);
   EXPECT_EQ(one->left, two->left);
+}
+
+TEST_F(Corridors, TheExpectedWayIsTheMeanOverThePlaces) {
+  // All ends look the same from as far away: the second comes into view 2 m after the first, where that was
+  // not the robot's.
+  const auto next = PlanNextLook(space_, Places(0.5, 0.3, 0.2), nullptr, options_, 1);
+  EXPECT_NEAR(next->expected_length_m - next->length_m, (0.3 + 0.2) * 2, 0.05);
+  const auto other = PlanNextLook(space_, Places(0.7, 0.2, 0.1), nullptr, options_, 1);
+  EXPECT_NEAR(other->expected_length_m - other->length_m, (0.2 + 0.1) * 2, 0.05);
+}
+
+TEST_F(Corridors, WhatIsRefusedIsNamed) {
+  const auto message = [&](const std::vector<PossiblePlace>& places) {
+    return PlanNextLook(space_, places, nullptr, options_, 1).error().message;
+  };
+  EXPECT_THAT(message({At(8, 1, 0, 0.5), At(NAN, 11, 0, 0.5)}), HasSubstr("place 2 of 2"));
+  EXPECT_THAT(message({At(8, 1, 0, 0.5), At(8, 11, 0, -0.1), At(8, 11, 0, 0.5)}), HasSubstr("place 2 of 3"));
+  EXPECT_THAT(message({At(8, 1, 0, 0.001), At(8, 11, 0, 0)}),
+              HasSubstr("none of 2 places has a probability of 0.01"));
+  EXPECT_THAT(message({At(8, 2, 0, 0.4), At(8, 100, 0, 0.6)}), HasSubstr("no robot stands at (8, 100)"));
 }
 
 TEST_F(Corridors, BadPlacesAreRefused) {
@@ -279,17 +309,140 @@ TEST(NextLook, ARobotNearAWallMoves) {
       {}, 1);
   ASSERT_TRUE(next.ok()) << next.error().message;
   EXPECT_EQ(next->outcome, NextLookOutcome::kFound);
+  // It keeps nine tenths of its distance.
+  for (const double x : {0.05, 10.05}) ExpectFree(space, *next, {{x, 0.5}, kPi / 2}, 0.9 * 0.05 - 1e-6);
 }
 
-// A map of four images, two in each of two rooms: those along +x look alike, those along +y do not.
-std::shared_ptr<const Map> MapOfTwins(bool says_alike) {
+// A room of 10 m x 10 m around (5, 5), and the same 20 m to the right of it with a pillar 3 m from its
+// middle, between two angles in a direction from it.  Robots stand in the middles, turned a little.
+class EmptyRoomAndOneWithAPillar : public testing::Test {
+ protected:
+  static constexpr double kHeading = 0.3;
+  static constexpr double kSpacingDeg = 360.0 / 192;  // of the beams that are compared
+  NextLook Looked(double direction, double right_deg, double left_deg, const NextLookOptions& options) const {
+    std::string text =
+        "0,0,10,0\n10,0,10,10\n10,10,0,10\n0,10,0,0\n20,0,30,0\n30,0,30,10\n30,10,20,10\n20,10,20,0\n";
+    if (left_deg > right_deg) {
+      const auto end = [&](double deg) {
+        return Vec2(Vec2(25, 5) +
+                    Eigen::Rotation2Dd(kHeading + direction) * Vec2(3, 3 * std::tan(RadFromDeg(deg))));
+      };
+      text += fmt::format("{},{},{},{}\n", end(right_deg).x(), end(right_deg).y(), end(left_deg).x(),
+                          end(left_deg).y());
+    }
+    const Views views = Plan(text);
+    const PlanSpace space(views);
+    const auto next =
+        PlanNextLook(space, std::vector<PossiblePlace>{At(5, 5, kHeading, 0.5), At(25, 5, kHeading, 0.5)},
+                     nullptr, options, 1);
+    EXPECT_TRUE(next.ok()) << next.error().message;
+    return next.ok() ? *next : NextLook{};
+  }
+};
+
+TEST_F(EmptyRoomAndOneWithAPillar, AreToldApartByBeamsEnough) {
+  // Without a step.  Each beam on the pillar is nearer than all of the other room, and those between two such
+  // beams are farther: of five beams 5 + 3, of four 4 + 2.  One counts as an eighth of 4 * 30 / 192 * 4, and
+  // 2 are enough: 7 beams.
+  const NextLookOptions stays{.reach_m = 0.1};
+  const double half = kSpacingDeg / 2;
+  const NextLook five = Looked(0, -5 * half, 5 * half, stays);
+  EXPECT_EQ(five.outcome, NextLookOutcome::kFound);
+  EXPECT_THAT(five.left, ElementsAre(ElementsAre(0), ElementsAre(1)));
+  EXPECT_EQ(five.num_looks, 1);
+  EXPECT_EQ(Looked(0, -3 * half, 5 * half, stays).outcome, NextLookOutcome::kOutOfReach);
+  EXPECT_EQ(Looked(0, -5 * half, 3 * half, stays).outcome, NextLookOutcome::kOutOfReach);
+}
+
+TEST_F(EmptyRoomAndOneWithAPillar, AreToldApartByALookAtThePillar) {
+  for (int eighth = 0; eighth < 8; ++eighth) {
+    const double direction = eighth * kPi / 4;
+    SCOPED_TRACE(eighth);
+    // With a narrow view there is but one such look, with a wide one it is the one with the pillar ahead.
+    for (const double view_deg : {12.0, 180.0}) {
+      const NextLook next = Looked(direction, -4.7, 4.7, {.view_deg = view_deg, .reach_m = 0.1});
+      ASSERT_EQ(next.outcome, NextLookOutcome::kFound) << view_deg;
+      EXPECT_NEAR(std::remainder(next.heading_rad - direction, 2 * kPi), 0, 1e-9) << view_deg;
+      EXPECT_THAT(next.path, ElementsAre(Vec2(0, 0)));
+      EXPECT_EQ(next.expected_length_m, 0);
+    }
+  }
+  // Between two looks a narrow view misses it; half a turn is seen by turning.
+  EXPECT_EQ(Looked(kPi / 8, -4.7, 4.7, {.view_deg = 12, .reach_m = 0.1}).outcome,
+            NextLookOutcome::kOutOfReach);
+  EXPECT_EQ(Looked(kPi / 8, -4.7, 4.7, {.view_deg = 60, .reach_m = 0.1}).outcome, NextLookOutcome::kFound);
+}
+
+TEST_F(EmptyRoomAndOneWithAPillar, AreLookedAtFromALatticeWithinReach) {
+  // No pillar: all looks are compared.
+  //        o
+  //      o o o        Ways of 1 m in steps of 0.5 m and of 0.71 m.
+  //    o o + o o
+  //      o o o
+  //        o
+  const NextLook near = Looked(0, 0, 0, {.step_m = 0.5, .reach_m = 1});
+  EXPECT_EQ(near.outcome, NextLookOutcome::kOutOfReach);
+  EXPECT_EQ(near.num_looks, 13);
+  // With (2, 1) and the like, to which no step leads straight.
+  EXPECT_EQ(Looked(0, 0, 0, {.step_m = 0.5, .reach_m = 1.15}).num_looks, 13);
+  EXPECT_EQ(Looked(0, 0, 0, {.step_m = 0.5, .reach_m = 1.25}).num_looks, 21);
+  // The whole room but for what is nearer to a wall than the robot's radius; turned by 0.3.
+  const double radius = 0.2;
+  const NextLook all = Looked(0, 0, 0, {.radius_m = radius, .step_m = 0.5});
+  EXPECT_EQ(all.outcome, NextLookOutcome::kAlike);
+  int num_inside = 0;
+  for (int row = -20; row <= 20; ++row) {
+    for (int column = -20; column <= 20; ++column)
+      num_inside +=
+          (Eigen::Rotation2Dd(kHeading) * (0.5 * Vec2(column, row))).cwiseAbs().maxCoeff() <= 5 - radius;
+  }
+  EXPECT_EQ(all.num_looks, num_inside);
+}
+
+TEST(NextLook, OfAsManyPlacesAsASetHolds) {
+  const Views views = Plan("0,0,20,0\n20,0,20,2\n20,2,0,2\n0,2,0,0");
+  const PlanSpace space(views);
+  const NextLookOptions options{.reach_m = 0.1, .least_probability = 0, .max_num_hypotheses = 64};
+  std::vector<PossiblePlace> places;
+  for (int i = 0; i < 70; ++i) places.push_back(At(1 + 0.25 * i, 1, 0, 1 + (i == 69 ? 1 : 0)));
+  const auto next = PlanNextLook(space, places, nullptr, options, 1);
+  ASSERT_TRUE(next.ok()) << next.error().message;
+  EXPECT_EQ(next->outcome, NextLookOutcome::kFound);
+  ASSERT_THAT(next->places, SizeIs(64));
+  EXPECT_EQ(next->hypotheses[0], 69);
+  EXPECT_EQ(next->hypotheses[63], 62);
+  for (int i = 0; i < 64; ++i) {
+    EXPECT_THAT(next->left[i], testing::Contains(i));
+    EXPECT_LT(next->left[i].size(), 64u);
+  }
+  // Each of these is five places; the last one gets four.
+  places.resize(13);
+  for (PossiblePlace& place : places) place.covariance.diagonal() << 1, 0.01, 1e-4;
+  const auto spread = PlanNextLook(space, places, nullptr, options, 1);
+  ASSERT_THAT(spread->places, SizeIs(64));
+  EXPECT_EQ(spread->hypotheses[63], 12);
+}
+
+TEST(NextLook, OptionsHaveTheirRanges) {
+  NextLookOptions options;
+  std::vector<std::pair<std::string, std::string>> ranges;
+  for (const Option& option : DescribeOptions(&options)) ranges.emplace_back(option.name, ValuesText(option));
+  EXPECT_THAT(ranges,
+              ElementsAre(Pair("radius_m", "0 to 10"), Pair("view_range_m", "0.1 to 10000"),
+                          Pair("view_deg", "1 to 360"), Pair("same_range_m", "0.001 to 10"),
+                          Pair("step_m", "0.05 to 10"), Pair("reach_m", "0.1 to 1000"),
+                          Pair("least_probability", "0 to 0.5"), Pair("max_num_hypotheses", "2 to 64")));
+}
+
+// A map of four images, two in each of two rooms: those along +x look alike, those turned from there do not.
+std::shared_ptr<const Map> MapOfTwins(bool says_alike, double turn_rad = kPi / 2) {
   MapRows rows;
   Camera camera;
   camera.width = camera.height = 100;
   camera.params = {100, 50, 50};
   rows.cameras = {camera};
   for (int i = 0; i < 4; ++i) {
-    const double x = i < 2 ? 1 : 11, heading = i % 2 == 0 ? 0 : kPi / 2;
+    const double x = i < 2 ? 1 : 11, heading = i % 2 == 0 ? 0 : turn_rad;
     Eigen::Matrix3d floor_from_cam;
     floor_from_cam << std::sin(heading), 0, std::cos(heading), -std::cos(heading), 0, std::sin(heading), 0,
         -1, 0;
@@ -329,6 +482,16 @@ TEST(SurveyedLooks, AreThoseOfTheNearestImage) {
   EXPECT_EQ(looks->PlaceAt({{1, 1}, RadFromDeg(29)}), 0);
   EXPECT_EQ(looks->PlaceAt({{1, 1}, RadFromDeg(31)}), -1);
   EXPECT_EQ(looks->PlaceAt({{11, 1}, kPi / 2 - 2 * kPi}), 3);
+  // Farther away and turned more count together.
+  EXPECT_EQ(looks->PlaceAt({{1.7, 1}, RadFromDeg(20)}), 0);
+  EXPECT_EQ(looks->PlaceAt({{1, 0.3}, RadFromDeg(-20)}), 0);
+  EXPECT_EQ(looks->PlaceAt({{1.8, 1}, RadFromDeg(20)}), -1);
+  EXPECT_EQ(looks->PlaceAt({{1, 1.8}, RadFromDeg(-20)}), -1);
+  // Of two the nearer one, whichever comes first.
+  const auto near = SurveyedLooks::Make(*MapOfTwins(true, RadFromDeg(20)), {});
+  EXPECT_EQ(near->PlaceAt({{1, 1}, RadFromDeg(9)}), 0);
+  EXPECT_EQ(near->PlaceAt({{1, 1}, RadFromDeg(11)}), 1);
+  EXPECT_EQ(near->PlaceAt({{11, 1}, RadFromDeg(-9)}), 2);
   EXPECT_TRUE(looks->AreAlike(0, 2));
   EXPECT_TRUE(looks->AreAlike(1, 1));
   EXPECT_FALSE(looks->AreAlike(1, 3));
