@@ -17,8 +17,8 @@ namespace {
 constexpr char kFormat[] = "cairn-world";
 constexpr int kWorldJsonVersion = 1;
 
-// Receives the parser's events.  Depth 1 is the document's object; a member is a number, a string, an array
-// of numbers, or an array of arrays of numbers.  Unknown members are skipped.
+// Receives the parser's events.  A member of the document's object is a number, a string, an array of
+// numbers, or an array of arrays of numbers.  Unknown members are skipped, whatever they hold.
 class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
  public:
   World world;
@@ -28,26 +28,26 @@ class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
   bool has_poses = false, has_edges = false, has_features = false;
 
   bool key(std::string& name) override {
-    if (depth_ == 1 && !in_array_) member_ = name;
+    if (objects_ == 0) member_ = name;
     return true;
   }
   bool start_object(size_t) override {
-    if (depth_ == 0) {
-      depth_ = 1;
+    if (!in_document_) {
+      in_document_ = true;
       return true;
     }
-    if (in_array_ || objects_ > 0) return Refuse("an object");
+    if (member_is_known()) return Refuse("an object");
     ++objects_;
-    return member_is_known() ? Refuse("an object") : true;
+    return true;
   }
   bool end_object() override {
     if (objects_ > 0) --objects_;
     return true;
   }
   bool start_array(size_t) override {
-    if (depth_ == 0) return Refuse("an array");
+    if (!in_document_) return Refuse("an array");
     ++in_array_;
-    if (!member_is_known() || objects_ > 0) return true;
+    if (!member_is_known()) return true;
     if (in_array_ == 1) return StartMember();
     if (in_array_ == 2 && is_nested()) {
       row_.clear();
@@ -57,7 +57,7 @@ class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
   }
   bool end_array() override {
     const int level = in_array_--;
-    if (!member_is_known() || objects_ > 0) return true;
+    if (!member_is_known()) return true;
     if (level == 2) return EndRow();
     if (member_ == "floor_from_world") return EndFloor();
     return true;
@@ -71,15 +71,15 @@ class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
   }
   bool number_float(number_float_t value, const string_t&) override { return Number(value, 0, false); }
   bool string(string_t& value) override {
-    if (objects_ > 0 || !member_is_known()) return true;
+    if (!member_is_known()) return true;
     if (member_ == "format" && !in_array_) {
       format = value;
       return true;
     }
     return Refuse("a text");
   }
-  bool null() override { return objects_ > 0 || !member_is_known() ? true : Refuse("null"); }
-  bool boolean(bool) override { return objects_ > 0 || !member_is_known() ? true : Refuse("a boolean"); }
+  bool null() override { return member_is_known() ? Refuse("null") : true; }
+  bool boolean(bool) override { return member_is_known() ? Refuse("a boolean") : true; }
   bool binary(binary_t&) override { return Refuse("binary"); }
   bool parse_error(size_t position, const std::string&,
                    const nlohmann::detail::exception& exception) override {
@@ -118,7 +118,7 @@ class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
     return false;
   }
   bool Number(double value, int64_t integer, bool is_integer) {
-    if (objects_ > 0 || !member_is_known()) return true;
+    if (!member_is_known()) return true;
     if (in_array_ == 0) {
       if (member_ == "version") {
         version = value;
@@ -202,7 +202,7 @@ class WorldHandler : public nlohmann::json_sax<nlohmann::json> {
     return false;
   }
 
-  int depth_ = 0;     // 1 inside of the document
+  bool in_document_ = false;
   int in_array_ = 0;  // nesting of arrays below the current member
   int objects_ = 0;   // nesting of objects below an unknown member
   std::string member_;

@@ -1,10 +1,14 @@
 #include "core/world/world.h"
 
+#include <cmath>
+#include <functional>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/files/file.h"
 #include "core/world/decomposition.h"
+#include "tests/core/world/edited_database.h"
 
 namespace cairn {
 namespace {
@@ -39,7 +43,7 @@ World FullWorld() {
   world.class_ids = {7, 9, 4000000000};
   world.station_images = {{1, 2}, {}, {2147483646}};
   world.lattice_spacing_m = 0.5;
-  world.floor_from_world.rotation = Eigen::Quaterniond(0.6, 0.8, 0, 0);
+  world.floor_from_world.rotation = Eigen::Quaterniond(0.5, -0.1, 0.7, 0.5);
   world.floor_from_world.translation = {1, 2, 3};
   return world;
 }
@@ -84,6 +88,8 @@ TEST(World, SameWorldGivesTheSameBytes) {
 TEST(WorldJson, AcceptsAnyOrderAndUnknownMembers) {
   const Result<World> world = ReadWorldJson(TemporaryFile("world_order.json", R"({
     "features": [[1, 0], [2], []], "comment": {"by": [["hand", null, true]]}, "edges": [[2, 1], [1, 0]],
+    "history": [{"poses": [[7, 7]], "by": {"name": {"first": "Ada"}}, "version": 9}, [[[{"edges": "none"}]]]],
+    "more": {"format": null, "features": [[9]], "in": [{"class_ids": -1}, {}]},
     "poses": [[0, 0], [5e-1, 0], [1, -0.25]], "version": 1, "format": "cairn-world"})"));
   ASSERT_TRUE(world.ok()) << world.error().message;
   ExpectEqual(*world, ThreeStations());
@@ -129,6 +135,7 @@ TEST(WorldJson, NumbersThatAreNoneAndFilesThatAreNoneAreErrors) {
   EXPECT_THAT(message("[[0,1e999]]"), HasSubstr("1e999"));
   EXPECT_THAT(message("[[0,true]]"), HasSubstr("poses[0]: found a boolean"));
   EXPECT_EQ(ReadError("").code, ErrorCode::kCorrupt);
+  EXPECT_THAT(ReadError("7").message, HasSubstr("\"format\" is ''"));
   EXPECT_EQ(ReadWorld(testing::TempDir()).error().code, ErrorCode::kNotFound);
 }
 
@@ -149,6 +156,211 @@ TEST(WorldDatabase, DamageIsAnErrorThatNamesTheFile) {
     const Result<World> world = ReadWorld(TemporaryFile("cut.db", whole.substr(0, size)));
     ASSERT_FALSE(world.ok()) << size;
     EXPECT_THAT(world.error().message, HasSubstr("cut.db"));
+  }
+}
+
+TEST(WorldDatabase, ErrorsNameTheTableAndTheRow) {
+  const std::string path = testing::TempDir() + "/whole_world.db";
+  ASSERT_TRUE(WriteWorldDatabase(FullWorld(), path).ok());
+  const auto error = [whole = *ReadFile(path)](const std::string& sql) {
+    const Result<World> world = ReadWorld(EditedDatabase("edited_world.db", whole, sql));
+    EXPECT_FALSE(world.ok()) << sql;
+    return world.ok() ? Error{} : world.error();
+  };
+  const auto message = [&](const std::string& sql) { return error(sql).message; };
+  EXPECT_THAT(message("PRAGMA application_id = 7"), HasSubstr("not a world database"));
+  EXPECT_THAT(message("DROP TABLE world"), HasSubstr("not a world database"));
+  EXPECT_THAT(message("PRAGMA user_version = 2"), HasSubstr("world version 2, this program reads 1"));
+  EXPECT_EQ(error("PRAGMA user_version = 2").code, ErrorCode::kUnsupported);
+  EXPECT_THAT(message("DELETE FROM world"), HasSubstr("table world is empty"));
+  EXPECT_THAT(message("UPDATE world SET num_stations = 4"),
+              HasSubstr("3 stations, 2 edges, 3 features; its header says 4, 2, 3"));
+  EXPECT_THAT(message("UPDATE world SET num_edges = 1"), HasSubstr("its header says 3, 1, 3"));
+  EXPECT_THAT(message("UPDATE world SET num_features = 2"), HasSubstr("its header says 3, 2, 2"));
+  EXPECT_THAT(message("DELETE FROM stations WHERE station_idx = 1"),
+              HasSubstr("table stations, station 1: missing"));
+  EXPECT_THAT(message("DELETE FROM features WHERE feature_idx = 0"),
+              HasSubstr("table features, feature 0: missing"));
+  EXPECT_THAT(message("UPDATE stations SET neighbours = x'010203' WHERE station_idx = 2"),
+              HasSubstr("station 2: a blob of 3 bytes"));
+  EXPECT_THAT(message("UPDATE stations SET images = x'0102' WHERE station_idx = 1"),
+              HasSubstr("station 1: a blob of 2 bytes"));
+  EXPECT_THAT(message("UPDATE features SET stations = x'01' WHERE feature_idx = 2"),
+              HasSubstr("feature 2: a blob of 1 bytes"));
+  EXPECT_THAT(message("UPDATE features SET stations = x'09000000' WHERE feature_idx = 1"),
+              HasSubstr("edited_world.db: feature 1: station 9 is outside of 0 to 2"));
+}
+
+TEST(CheckWorld, NamesTheElement) {
+  const auto message = [](const std::function<void(World*)>& spoil) {
+    World world = FullWorld();
+    spoil(&world);
+    const Status status = CheckWorld(world);
+    EXPECT_TRUE(status.ok() || status.error().code == ErrorCode::kInvalidArgument);
+    return status.ok() ? "" : status.error().message;
+  };
+  EXPECT_EQ(message([](World*) {}), "");
+  EXPECT_EQ(message([](World* w) { w->headings_deg = {}; }), "");
+  EXPECT_EQ(message([](World* w) {
+              w->headings_deg = {1, 2};
+            }),
+            "headings_deg: 2 entries, expected none or 3");
+  EXPECT_EQ(message([](World* w) { w->class_ids.pop_back(); }), "class_ids: 2 entries, expected none or 3");
+  EXPECT_EQ(message([](World* w) { w->station_images.resize(4); }),
+            "station_images: 4 entries, expected none or 3");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{-1, 2}};
+            }),
+            "edge 0: [-1, 2] names a station outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{0, 1}, {1, 3}};
+            }),
+            "edge 1: [1, 3] names a station outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{3, 1}};
+            }),
+            "edge 0: [3, 1] names a station outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{1, -1}};
+            }),
+            "edge 0: [1, -1] names a station outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) { w->edges = {{0, 0}}; }), "edge 0: joins station 0 to itself");
+  EXPECT_EQ(message([](World* w) { w->edges = {{1, 0}}; }), "edge 0: [1, 0] is a duplicate or out of order");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{0, 2}, {0, 1}};
+            }),
+            "edge 1: [0, 1] is a duplicate or out of order");
+  EXPECT_EQ(message([](World* w) {
+              w->edges = {{0, 1}, {0, 1}};
+            }),
+            "edge 1: [0, 1] is a duplicate or out of order");
+  EXPECT_EQ(message([](World* w) { w->areas[1] = {-1}; }), "feature 1: station -1 is outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) { w->areas[2] = {0, 3}; }), "feature 2: station 3 is outside of 0 to 2");
+  EXPECT_EQ(message([](World* w) {
+              w->areas[0] = {2, 2};
+            }),
+            "feature 0: station 2 is a duplicate or out of order");
+  EXPECT_EQ(message([](World* w) {
+              w->areas[0] = {2, 0};
+            }),
+            "feature 0: station 0 is a duplicate or out of order");
+  const double nan = std::nan("");
+  EXPECT_EQ(message([&](World* w) { w->positions[1].y() = nan; }),
+            "station 1: its place is not a finite number");
+  EXPECT_EQ(message([&](World* w) { w->headings_deg[2] = nan; }),
+            "station 2: its place is not a finite number");
+}
+
+TEST(CheckWorld, NoTwoStationsAreAtOnePlaceWithOneHeading) {
+  const auto message = [](const std::vector<Eigen::Vector2d>& positions,
+                          const std::vector<double>& headings_deg) {
+    World world;
+    world.positions = positions;
+    world.headings_deg = headings_deg;
+    const Status status = CheckWorld(world);
+    return status.ok() ? "" : status.error().message;
+  };
+  EXPECT_EQ(message({{1, 2}, {0, 0}, {1, 2}}, {}), "stations 0 and 2 are at the same place (1, 2)");
+  EXPECT_EQ(message({{1, 2}, {0, 0}, {1, 2}}, {90, 0, 90}), "stations 0 and 2 are at the same place (1, 2)");
+  EXPECT_EQ(message({{1, 2}, {1, 2}}, {90, 0}), "");
+  EXPECT_EQ(message({{1, 2}, {1, 3}, {2, 2}}, {}), "");
+}
+
+TEST(WorldJson, MembersThatAreNotWhatTheyShouldBeAreErrors) {
+  const auto message = [](const std::string& members) {
+    return ReadError(R"({"format":"cairn-world","version":1,)" + members + "}").message;
+  };
+  EXPECT_THAT(message(R"("poses":[],"poses":[])"), HasSubstr("member 'poses' occurs twice"));
+  EXPECT_THAT(message(R"("edges":[],"edges":[])"), HasSubstr("member 'edges' occurs twice"));
+  EXPECT_THAT(message(R"("features":[],"features":[])"), HasSubstr("member 'features' occurs twice"));
+  EXPECT_THAT(message(R"("format":["cairn-world"])"),
+              HasSubstr("format[0]: found an array, expected a text"));
+  EXPECT_THAT(message(R"("version":[1])"), HasSubstr("version[0]: found an array, expected a number"));
+  EXPECT_THAT(message(R"("version":"1")"), HasSubstr("version: found a text, expected a number"));
+  EXPECT_THAT(message(R"("format":1)"), HasSubstr("format: found a number, expected a text"));
+  EXPECT_THAT(message(R"("lattice_spacing_m":[1])"), HasSubstr("lattice_spacing_m[0]: found an array"));
+  EXPECT_THAT(message(R"("poses":3)"), HasSubstr("poses: found a number, expected [x, y]"));
+  EXPECT_THAT(message(R"("poses":[[0,0],[[1]]])"), HasSubstr("poses[1]: found an array"));
+  EXPECT_THAT(message(R"("poses":[[0,0],[1]])"), HasSubstr("poses[1]: found 1 numbers"));
+  EXPECT_THAT(message(R"("poses":[[0,0],["format"]])"), HasSubstr("poses[1]: found a text"));
+  EXPECT_THAT(message(R"("poses":[{}])"), HasSubstr("poses[0]: found an object"));
+  EXPECT_THAT(message(R"("edges":[[0,1],[1,2],[2]])"),
+              HasSubstr("edges[2]: found 1 indices, expected [station"));
+  EXPECT_THAT(message(R"("edges":[[0,1,2]])"), HasSubstr("edges[0]: found 3 indices"));
+  EXPECT_THAT(message(R"("features":[[0],[2147483648]])"),
+              HasSubstr("features[1]: 2.14748e+09 is not an index (an integer from 0 to 2147483647)"));
+  EXPECT_THAT(message(R"("features":[[18446744073709551615]])"),
+              HasSubstr("features[0]: 1.84467e+19 is not an index"));
+  EXPECT_THAT(message(R"("station_images":[[1],[],[-1]])"),
+              HasSubstr("station_images[2]: -1 is not an index"));
+  EXPECT_THAT(message(R"("station_images":[4])"), HasSubstr("expected a list of image ids"));
+  EXPECT_THAT(message(R"("class_ids":[[1]])"),
+              HasSubstr("class_ids[0]: found an array, expected a list of class ids"));
+  EXPECT_THAT(message(R"("class_ids":[5,4294967295])"),
+              HasSubstr("class_ids[1]: 4.29497e+09 is not an index (an integer from 0 to 4294967294)"));
+  EXPECT_THAT(message(R"("headings_deg":[1,2,"x"])"),
+              HasSubstr("headings_deg[2]: found a text, expected a list of numbers"));
+  EXPECT_THAT(message(R"("floor_from_world":[1,0,0,0,0,0])"),
+              HasSubstr("floor_from_world: found 6 numbers, expected [qw, qx, qy, qz, tx, ty, tz]"));
+}
+
+TEST(WorldJson, LargestIndicesAndIdsAreRead) {
+  World world;
+  world.positions = {{0, 0}};
+  world.areas = {{0}};
+  world.class_ids = {4294967294};
+  world.station_images = {{2147483647}};
+  const std::string path = testing::TempDir() + "/largest.json";
+  ASSERT_TRUE(WriteWorldJson(world, path).ok());
+  const Result<World> read = ReadWorldJson(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ExpectEqual(*read, world);
+}
+
+TEST(WorldJson, AnOtherFormatIsCorruptAndAnOtherVersionUnsupported) {
+  EXPECT_EQ(ReadError(R"({"format":"cairn-regions","version":1})").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ReadError(R"({"format":"cairn-world","version":2})").code, ErrorCode::kUnsupported);
+  EXPECT_THAT(ReadError(R"({"format":"cairn-world"})").message,
+              HasSubstr("world version 0, this program reads 1"));
+}
+
+TEST(RegionsDatabase, ErrorsNameTheRow) {
+  const std::string path = testing::TempDir() + "/whole_regions.db";
+  const Decomposition decomposition{.algorithm = "b2", .k = 1, .regions = {{{0}, {0, 1}}, {{1}, {2}}}};
+  ASSERT_TRUE(WriteDecompositionDatabase(decomposition, path).ok());
+  const auto error = [whole = *ReadFile(path)](const std::string& sql) {
+    const Result<Decomposition> read = ReadDecomposition(EditedDatabase("edited_regions.db", whole, sql));
+    EXPECT_FALSE(read.ok()) << sql;
+    return read.ok() ? Error{} : read.error();
+  };
+  const auto message = [&](const std::string& sql) { return error(sql).message; };
+  EXPECT_THAT(message("PRAGMA application_id = 7"), HasSubstr("not a database of regions"));
+  EXPECT_THAT(message("DROP TABLE decomposition"), HasSubstr("not a database of regions"));
+  EXPECT_THAT(message("PRAGMA user_version = 2"), HasSubstr("regions version 2, this program reads 1"));
+  EXPECT_EQ(error("PRAGMA user_version = 2").code, ErrorCode::kUnsupported);
+  EXPECT_THAT(message("DELETE FROM decomposition"), HasSubstr("table decomposition is empty"));
+  EXPECT_THAT(message("UPDATE decomposition SET uncovered = x'01'"),
+              HasSubstr("uncovered stations: a blob of 1"));
+  EXPECT_THAT(message("DELETE FROM regions WHERE region_idx = 0"), HasSubstr("region 0: missing"));
+  EXPECT_THAT(message("UPDATE regions SET features = x'0102' WHERE region_idx = 1"),
+              HasSubstr("region 1: a blob of 2"));
+  EXPECT_THAT(message("UPDATE regions SET stations = x'010203' WHERE region_idx = 1"),
+              HasSubstr("region 1: a blob of 3"));
+}
+
+TEST(NumRegionsText, CountsInWords) {
+  EXPECT_EQ(NumRegionsText(9, 8), "9 regions, at least 8 are needed");
+  EXPECT_EQ(NumRegionsText(1, 1), "1 region, at least 1 is needed");
+  EXPECT_EQ(NumRegionsText(0, std::nullopt), "0 regions");
+}
+
+TEST(Decomposition, OnlyANameWithTheSuffixIsJson) {
+  const Decomposition decomposition{.algorithm = "b2", .k = 1};
+  for (const auto& [name, is_json] :
+       {std::pair("r.json", true), std::pair("json", false), std::pair("r.jsonl", false)}) {
+    const std::string path = testing::TempDir() + "/" + name;
+    ASSERT_TRUE(WriteDecomposition(decomposition, path).ok());
+    EXPECT_EQ(IsSqliteFile(path), !is_json) << name;
   }
 }
 
@@ -196,6 +408,26 @@ TEST(DecompositionJson, ErrorsNameTheElement) {
               HasSubstr("regions[1]: 4294967296 is not an integer"));
   EXPECT_THAT(message("4", R"([{"features":[1]}])", "[]"), HasSubstr("regions[0]"));
   EXPECT_THAT(message("NaN", "[]", "[]"), HasSubstr("not JSON"));
+  EXPECT_THAT(message("2147483648", "[]", "[]"), HasSubstr("k: 2147483648 is not an integer"));
+  EXPECT_THAT(message("-2147483649", "[]", "[]"), HasSubstr("k: -2147483649 is not an integer"));
+}
+
+TEST(DecompositionJson, TheSmallestAndTheLargestNumbersAreRead) {
+  const Result<Decomposition> read = ReadDecompositionJson(TemporaryFile(
+      "regions_limits.json",
+      R"({"format":"cairn-regions","version":1,"algorithm":"b2","k":2147483647,"tau":-2147483648,"rho":0,"seed":0,
+          "regions":[],"uncovered":[]})"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->k, 2147483647);
+  EXPECT_EQ(read->tau, -2147483648);
+}
+
+TEST(DecompositionJson, AnotherFormatIsCorruptAndAnotherVersionUnsupported) {
+  const auto error = [](const std::string& text) {
+    return ReadDecompositionJson(TemporaryFile("other.json", text)).error();
+  };
+  EXPECT_EQ(error(R"({"format":"cairn-world","version":1})").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(error(R"({"format":"cairn-regions","version":2})").code, ErrorCode::kUnsupported);
 }
 
 TEST(DecompositionJson, TruncationIsCorrupt) {
