@@ -25,7 +25,6 @@ class Checker {
     CheckCoverage();
     CheckRedundancy();
     CheckBound();
-    check_.largest_hole = 0;
     StationSet hole = uncovered_;
     while (!hole.empty()) {
       const StationSet part = ReachableFrom(hole[0], hole);

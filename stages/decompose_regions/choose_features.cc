@@ -88,7 +88,7 @@ class Chooser {
       if (!region->Take(world_.areas[candidate.feature])) continue;
       features.push_back(candidate.feature);
       if (!is_landmark_[candidate.feature]) information_.Add(candidate.sights);
-      is_landmark_[candidate.feature] = 1;
+      is_landmark_[candidate.feature] = true;
     }
     std::sort(features.begin(), features.end());
     return features;

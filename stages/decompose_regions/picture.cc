@@ -38,7 +38,7 @@ struct Grid {
     std::complex<double> direction = 0;
     for (const auto& [u, v] : world.edges) {
       const Vec2 difference = world.positions[v] - world.positions[u];
-      if (difference.norm() < 1e-9) continue;  // between headings
+      if (difference.isZero()) continue;  // between headings
       lengths.push_back(difference.norm());
       direction += std::polar(1.0, 4.0 * std::atan2(difference.y(), difference.x()));
     }
@@ -70,7 +70,7 @@ class Picture {
         cells.insert(station_cells_[station]);
         sum += world.positions[station];
       }
-      centres_.push_back(sum / static_cast<double>(std::max<size_t>(1, region.stations.size())));
+      centres_.push_back(sum / static_cast<double>(region.stations.size()));
     }
     ChooseColours();
     SetExtent();
@@ -110,7 +110,7 @@ class Picture {
       for (const int other : around) ++uses[colours_[other]];
       // Among unused colours start where the index points, so that neighbours in the list differ as well.
       int best = static_cast<int>(i % kSvgManyColours.size());
-      for (size_t step = 0; step < kSvgManyColours.size(); ++step) {
+      for (size_t step = 1; step < kSvgManyColours.size(); ++step) {
         const int colour = static_cast<int>((i + step) % kSvgManyColours.size());
         if (uses[colour] < uses[best]) best = colour;
       }
@@ -160,11 +160,10 @@ class Picture {
   }
   double HeadingWidthDeg() const {
     const std::set<double> headings(world_.headings_deg.begin(), world_.headings_deg.end());
-    double width = 360;
-    for (auto it = headings.begin(); it != headings.end() && std::next(it) != headings.end(); ++it) {
+    double width = 170;
+    for (auto it = headings.begin(); std::next(it) != headings.end(); ++it)
       width = std::min(width, *std::next(it) - *it);
-    }
-    return std::min(width, 170.0);
+    return width;
   }
 
   void DrawStations() {

@@ -194,6 +194,149 @@ TEST(ChooseFeatures, RegionShrinksForABetterFeatureButKeepsWhatOnlyItCovers) {
   EXPECT_THAT(first_region(1).stations, ElementsAre(0, 1, 2, 3));
 }
 
+// Stations in a row with an image each, and features that all look at one point, worse (2 m) or better ones.
+class RowSurvey {
+ public:
+  explicit RowSurvey(int num_stations) : survey_(SurveyOf(AsciiWorld({std::string(num_stations, 'o')}, {}))) {
+    for (int station = 0; station < num_stations; ++station)
+      AddImage({0.5 * station, 0, 0}, 0, station, &survey_);
+  }
+  // Returns the class, whose feature is the next one.
+  FeatureClass& Add(const std::vector<int>& seen_from, double sigma_m) {
+    FeatureClass& added = AddClass({1, 0.2, 4}, seen_from, &random_, &survey_);
+    added.covariance = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+    return added;
+  }
+  // What becomes of regions of these stations, which have feature 0.
+  std::vector<Region> Choose(const std::vector<std::vector<StationIdx>>& stations,
+                             double min_kept_ratio) const {
+    Decomposition decomposition{.algorithm = "b2", .k = 1};
+    for (const std::vector<StationIdx>& of_region : stations)
+      decomposition.regions.push_back({{0}, of_region});
+    const Result<Decomposition> chosen =
+        ChooseFeatures(survey_.world, survey_.classes, decomposition, {.min_kept_ratio = min_kept_ratio});
+    EXPECT_TRUE(chosen.ok()) << (chosen.ok() ? "" : chosen.error().message);
+    return chosen.ok() ? chosen->regions : std::vector<Region>();
+  }
+  Survey& survey() { return survey_; }
+
+ private:
+  Survey survey_;
+  Random random_{8};
+};
+
+TEST(ChooseFeatures, RegionKeepsTheConnectedPartThatIsNeededAndLargeEnough) {
+  //   stations        0 1 2 3 4 5
+  //   region 0        # # # # # #     only it covers 3 to 5
+  //   region 1        # # # . . .
+  //   a good feature  # . # # # #     parts {0}, which is too small, and {2, 3, 4, 5}
+  //   or              # # . # # #     parts {0, 1}, without what is needed, and {3, 4, 5}
+  for (const bool first : {true, false}) {
+    RowSurvey row(6);
+    row.Add({0, 1, 2, 3, 4, 5}, 2);
+    row.Add(first ? std::vector<int>{0, 2, 3, 4, 5} : std::vector<int>{0, 1, 3, 4, 5}, 1e-3);
+    const std::vector<Region> regions = row.Choose({{0, 1, 2, 3, 4, 5}, {0, 1, 2}}, first ? 0.5 : 0.25);
+    EXPECT_THAT(regions[0].features, ElementsAre(1)) << first;
+    if (first) {
+      EXPECT_THAT(regions[0].stations, ElementsAre(2, 3, 4, 5));
+    } else {
+      EXPECT_THAT(regions[0].stations, ElementsAre(3, 4, 5));
+    }
+    EXPECT_THAT(regions[1].stations, ElementsAre(0, 1, 2)) << first;
+  }
+}
+
+TEST(ChooseFeatures, LaterRegionsKeepWhatEarlierOnesGaveUpAndNoMore) {
+  //   stations         0 1 2 3 4
+  //   region 0         # # # . .
+  //   region 1         . # # # #
+  //   good for 0       # # . . .     it gives up station 2
+  //   good for 1       . . # # #     it may give up station 1, which region 0 still covers
+  //   better for 1     . . . # #     but not station 2
+  RowSurvey row(5);
+  row.Add({0, 1, 2, 3, 4}, 2);
+  row.Add({0, 1}, 1e-3);
+  row.Add({2, 3, 4}, 0.1);
+  row.Add({3, 4}, 1e-3);
+  const std::vector<Region> regions = row.Choose({{0, 1, 2}, {1, 2, 3, 4}}, 0.5);
+  EXPECT_THAT(regions[0].stations, ElementsAre(0, 1));
+  EXPECT_THAT(regions[0].features, ElementsAre(1));
+  EXPECT_THAT(regions[1].stations, ElementsAre(2, 3, 4));
+  EXPECT_THAT(regions[1].features, ElementsAre(2));
+}
+
+TEST(ChooseFeatures, RegionThatNoStationNeedsStaysAsItIs) {
+  RowSurvey row(4);
+  row.Add({0, 1, 2, 3}, 2);
+  row.Add({0, 1, 2}, 1e-3);
+  const std::vector<Region> regions = row.Choose({{0, 1, 2, 3}, {0, 1, 2, 3}}, 0.5);
+  for (const Region& region : regions) {
+    EXPECT_THAT(region.stations, ElementsAre(0, 1, 2, 3));
+    EXPECT_THAT(region.features, ElementsAre(0));
+  }
+}
+
+TEST(ChooseFeatures, RegionThatKeepsAllStationsComparesOnlyWhatAllOfThemSee) {
+  // Feature 2, which looks like feature 0, is seen from the stations that only region 0 covers: it makes
+  // feature 0 less distinctive where the region might shrink to them, and only there.
+  RowSurvey row(4);
+  row.Add({0, 1, 2, 3}, 1e-3);
+  row.Add({0, 1, 2, 3}, 1e-3);
+  const auto descriptor = row.survey().classes.classes[0].descriptor;
+  row.Add({0, 1}, 5).descriptor = descriptor;
+  EXPECT_THAT(row.Choose({{0, 1, 2}, {2, 3}}, 1)[0].features, ElementsAre(0));
+  EXPECT_THAT(row.Choose({{0, 1, 2}, {2, 3}}, 0.99)[0].features, ElementsAre(1));
+}
+
+TEST(ChooseFeatures, ALandmarkOfAnotherRegionAddsNothing) {
+  // Even a feature that hardly tells anything adds more.
+  Survey survey = LoneImage();
+  Random random(9);
+  AddClass(Toward(0.1, 0.2, 4), {0}, &random, &survey);
+  AddClass(Toward(-0.3, -0.2, 4), {0}, &random, &survey).covariance = 100 * Eigen::Matrix3d::Identity();
+  const Region region{.features = {0}, .stations = {0}};
+  const Decomposition decomposition{.algorithm = "b2", .k = 1, .regions = {region, region}};
+  const Decomposition chosen = *ChooseFeatures(survey.world, survey.classes, decomposition, {});
+  EXPECT_THAT(chosen.regions[0].features, ElementsAre(0));
+  EXPECT_THAT(chosen.regions[1].features, ElementsAre(1));
+}
+
+TEST(ChooseFeatures, AWorldWithoutFeaturesNeedsNoNamesOfClasses) {
+  const Decomposition none{.algorithm = "b2", .k = 1};
+  EXPECT_TRUE(ChooseFeatures(AsciiWorld({"oo"}, {}), Classes(), none, {}).ok());
+}
+
+TEST(ChooseFeatures, OptionsHaveTheRangesOfTheirComments) {
+  const auto check = [](const ChooseFeaturesOptions& options) {
+    ChooseFeaturesOptions checked = options;
+    return CheckOptions(DescribeOptions(&checked)).ok();
+  };
+  const ChooseFeaturesOptions least{.min_kept_ratio = 0,
+                                    .keypoint_sigma_px = 1e-3,
+                                    .keypoint_sigma_per_scale = 0,
+                                    .confusion_angle_rad = 1e-3,
+                                    .rough_sigma_m = 1e-3,
+                                    .rough_sigma_deg = 1e-2};
+  const ChooseFeaturesOptions most{.min_kept_ratio = 1,
+                                   .keypoint_sigma_px = 1e3,
+                                   .keypoint_sigma_per_scale = 1e3,
+                                   .confusion_angle_rad = 10,
+                                   .rough_sigma_m = 1e6,
+                                   .rough_sigma_deg = 1e3};
+  EXPECT_TRUE(check(least));
+  EXPECT_TRUE(check(most));
+  for (const auto member :
+       {&ChooseFeaturesOptions::min_kept_ratio, &ChooseFeaturesOptions::keypoint_sigma_px,
+        &ChooseFeaturesOptions::keypoint_sigma_per_scale, &ChooseFeaturesOptions::confusion_angle_rad,
+        &ChooseFeaturesOptions::rough_sigma_m, &ChooseFeaturesOptions::rough_sigma_deg}) {
+    ChooseFeaturesOptions less = least, more = most;
+    less.*member -= 1e-4;
+    more.*member *= 1.01;
+    EXPECT_FALSE(check(less));
+    EXPECT_FALSE(check(more));
+  }
+}
+
 // The objective written out, with Jacobians by differences.
 double Objective(const Survey& survey, const std::vector<FeatureIdx>& features,
                  const ChooseFeaturesOptions& options) {
@@ -332,6 +475,13 @@ TEST(ChooseFeatures, ErrorsNameTheElement) {
   lost_class.classes.classes.clear();
   lost_image.classes.images[0].image_id = 77;
   lost_camera.classes.cameras.clear();
+  Survey later_class = survey, earlier_image = survey, other_camera = survey;
+  later_class.classes.classes[0].class_id = 101;
+  earlier_image.classes.images[0].image_id = 9;
+  other_camera.classes.cameras[0].camera_id = 2;
+  EXPECT_THAT(message(later_class), HasSubstr("feature 0 of the world is class 100"));
+  EXPECT_THAT(message(earlier_image), HasSubstr("class 100 is observed in image 10"));
+  EXPECT_THAT(message(other_camera), HasSubstr("image 10 is of camera 1"));
   EXPECT_THAT(message(nameless), HasSubstr("does not name the classes"));
   EXPECT_THAT(message(lost_class), HasSubstr("feature 0 of the world is class 100"));
   EXPECT_THAT(message(lost_image), HasSubstr("class 100 is observed in image 10"));

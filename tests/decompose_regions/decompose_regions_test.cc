@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <atomic>
+#include <functional>
+#include <optional>
 
 #include "stages/decompose_regions/check_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
@@ -302,6 +304,197 @@ TEST(CheckRegions, NamesEachPropertyThatFails) {
   bad = good;
   bad.lower_bound = 3;
   EXPECT_THAT(CheckRegions(world, bad).violations, ElementsAre(HasSubstr("lower bound 3 exceeds")));
+}
+
+// The regions {0, 1, 2, 3} and {3, 4, 5, 6} of the row, which together cover it.
+Decomposition TwoRegions() {
+  return {.algorithm = "b2", .k = 2, .regions = {{{0, 1}, {0, 1, 2, 3}}, {{2, 3}, {3, 4, 5, 6}}}};
+}
+std::vector<std::string> Violations(const Decomposition& decomposition, int max_hole = -1) {
+  return CheckRegions(RowWorld(), decomposition, max_hole).violations;
+}
+
+TEST(CheckRegions, NamesEveryNumberThatCannotBe) {
+  const auto violations_of = [](const std::function<void(Decomposition*)>& spoil) {
+    Decomposition decomposition = TwoRegions();
+    spoil(&decomposition);
+    return Violations(decomposition);
+  };
+  EXPECT_THAT(Violations(TwoRegions()), IsEmpty());
+  EXPECT_THAT(violations_of([](Decomposition* d) { d->k = 0; }), ElementsAre("k = 0 is not positive"));
+  EXPECT_THAT(violations_of([](Decomposition* d) { d->tau = -1; }), ElementsAre("tau = -1 is negative"));
+  EXPECT_THAT(violations_of([](Decomposition* d) { d->regions[1].stations = {}; }),
+              ElementsAre("region 1 has no station"));
+  EXPECT_THAT(
+      violations_of([](Decomposition* d) {
+        d->regions[1].stations = {-1, 3, 7};
+      }),
+      ElementsAre("region 1: station: -1 is outside of 0 to 6", "region 1: station: 7 is outside of 0 to 6"));
+  EXPECT_THAT(violations_of([](Decomposition* d) {
+                d->regions[0].features = {0, 3, 4};
+              }),
+              ElementsAre("region 0: feature: 4 is outside of 0 to 3"));
+  EXPECT_THAT(violations_of([](Decomposition* d) {
+                d->regions[0].features = {1, 0, 2, 2};
+              }),
+              ElementsAre("region 0: feature: 0 is a duplicate or out of order",
+                          "region 0: feature: 2 is a duplicate or out of order"));
+  EXPECT_THAT(violations_of([](Decomposition* d) {
+                d->uncovered = {6, 7};
+              }),
+              ElementsAre("uncovered station: 7 is outside of 0 to 6"));
+  // What stands before it is none that it could be a duplicate of.
+  EXPECT_THAT(violations_of([](Decomposition* d) {
+                d->uncovered = {0, 0};
+              }),
+              ElementsAre("uncovered station: 0 is a duplicate or out of order"));
+}
+
+TEST(CheckRegions, SaysWhatOfARegionCannotBeReachedOrSeen) {
+  Decomposition parted = TwoRegions();
+  parted.regions[0].stations = {0, 1, 3};
+  EXPECT_THAT(
+      Violations(parted),
+      testing::Contains("region 0 is not connected: 1 of its 3 stations cannot be reached from station 0"));
+  Decomposition blind = TwoRegions();
+  blind.regions[1] = {{0, 3}, {3, 4, 5, 6}};
+  EXPECT_THAT(Violations(blind), ElementsAre("region 1: feature 0 is not visible from station 4"));
+}
+
+TEST(CheckRegions, TellsHolesFromStationsThatCannotBeCovered) {
+  // With k = 2 and tau = 1 all stations but the ends' can be covered from their neighbours: station 3 has two
+  // features in common with 2 and 4.
+  Decomposition overlapping = TwoRegions();
+  overlapping.tau = 1;
+  overlapping.rho = 1;
+  RegionCheck check = CheckRegions(RowWorld(), overlapping, 1);
+  EXPECT_THAT(
+      check.violations,
+      ElementsAre("station 3 is not listed as uncovered, but no region contains its neighbourhood (1 such "
+                  "differences)"));
+  EXPECT_EQ(check.num_coverable, 7);
+  EXPECT_EQ(check.num_uncovered, 1);
+  EXPECT_EQ(check.largest_hole, 1);
+  overlapping.uncovered = {3};
+  EXPECT_THAT(Violations(overlapping, 1), IsEmpty());
+  EXPECT_THAT(Violations(overlapping, 0),
+              ElementsAre("a hole of 1 connected uncovered stations is larger than 0"));
+  overlapping.rho = 0;
+  EXPECT_THAT(Violations(overlapping),
+              ElementsAre("1 coverable stations are uncovered although rho = 0; first: station 3"));
+  Decomposition excused = TwoRegions();
+  excused.uncovered = {4, 5};
+  EXPECT_THAT(
+      Violations(excused),
+      ElementsAre(
+          "station 4 is listed as uncovered, but it is covered or not coverable (2 such differences)"));
+}
+
+TEST(CheckRegions, TheLargestHoleIsThatOfConnectedStations) {
+  // Region {3} leaves a hole on either side: stations 0 to 2, and 4 to 7.
+  const World world = AsciiWorld({"oooooooo"}, {{"########"}});
+  const Decomposition middle{
+      .algorithm = "b2", .k = 1, .rho = 9, .regions = {{{0}, {3}}}, .uncovered = {0, 1, 2, 4, 5, 6, 7}};
+  const RegionCheck check = CheckRegions(world, middle, 4);
+  EXPECT_EQ(check.largest_hole, 4);
+  EXPECT_THAT(check.violations, IsEmpty());
+  EXPECT_THAT(CheckRegions(world, middle, 3).violations,
+              ElementsAre("a hole of 4 connected uncovered stations is larger than 3"));
+}
+
+TEST(CheckRegions, ABoundIsAtMostTheRegionsForAsManyUncoveredStations) {
+  Decomposition bounded = TwoRegions();
+  bounded.lower_bound = 2;
+  EXPECT_THAT(Violations(bounded), IsEmpty());
+  bounded.lower_bound = 3;
+  EXPECT_THAT(Violations(bounded), ElementsAre("the lower bound 3 exceeds the 2 regions"));
+  bounded = {
+      .algorithm = "b2", .k = 2, .rho = 3, .regions = {{{0, 1}, {0, 1, 2, 3}}}, .uncovered = {4, 5, 6}};
+  bounded.lower_bound = 1;
+  bounded.uncovered_limit = 3;
+  EXPECT_THAT(Violations(bounded), IsEmpty());
+  bounded.uncovered_limit = 2;
+  EXPECT_THAT(Violations(bounded),
+              ElementsAre("the lower bound allows 2 uncovered stations, but there are 3"));
+}
+
+TEST(CheckRegions, ARegionIsNeededForAStationThatNoOtherCovers) {
+  Decomposition three = TwoRegions();
+  three.regions.insert(three.regions.begin() + 1, Region{{1, 3}, {2, 3, 4}});
+  EXPECT_THAT(Violations(three),
+              ElementsAre("region 1 is redundant: every station that it covers is covered by another"));
+}
+
+TEST(DecomposeRegions, OptionsHaveTheRangesOfTheirComments) {
+  const auto check = [](const DecomposeRegionsOptions& options) {
+    DecomposeRegionsOptions checked = options;
+    return CheckOptions(DescribeOptions(&checked)).ok();
+  };
+  EXPECT_TRUE(check({.k = 1,
+                     .tau = 0,
+                     .rho = 0,
+                     .max_hole = -1,
+                     .alpha = 0,
+                     .best_exchanges_per_station = 0,
+                     .best_num_repairs = 0,
+                     .best_window_stations = 1,
+                     .best_max_stations = 0}));
+  EXPECT_TRUE(check({.alpha = 1}));
+  EXPECT_FALSE(check({.k = 0}));
+  EXPECT_FALSE(check({.tau = -1}));
+  EXPECT_FALSE(check({.rho = -1}));
+  EXPECT_FALSE(check({.max_hole = -2}));
+  EXPECT_FALSE(check({.alpha = -0.01}));
+  EXPECT_FALSE(check({.alpha = 1.01}));
+  EXPECT_FALSE(check({.best_exchanges_per_station = -1}));
+  EXPECT_FALSE(check({.best_num_repairs = -1}));
+  EXPECT_FALSE(check({.best_window_stations = 0}));
+  EXPECT_FALSE(check({.best_max_stations = -1}));
+}
+
+TEST(DecomposeRegions, LowerBoundIsOfTheKindThatIsAskedFor) {
+  //     0        Each of the four arms sees a feature of its own, and the middle sees all four: every arm
+  //     needs a
+  //   1 2 3      region.  Counting knows only that a region covers two of the five, and finds three; the
+  //     4        certified bound is four.
+  const World world = AsciiWorld(
+      {".o.", "ooo", ".o."},
+      {{".#.", ".#.", "..."}, {"...", "##.", "..."}, {"...", ".##", "..."}, {"...", ".#.", ".#."}});
+  const auto bound = [&](const char* algorithm, const char* lower_bound, int best_max_stations) {
+    return Decompose(world, {.algorithm = algorithm,
+                             .k = 1,
+                             .tau = 0,
+                             .lower_bound = lower_bound,
+                             .best_max_stations = best_max_stations})
+        .lower_bound;
+  };
+  for (const char* algorithm : kAlgorithms) {
+    EXPECT_EQ(bound(algorithm, "certified", 5), 4) << algorithm;
+    EXPECT_EQ(bound(algorithm, "counted", 5), 3) << algorithm;
+    EXPECT_EQ(bound(algorithm, "auto", 5), algorithm == std::string("best") ? 4 : 3) << algorithm;
+    EXPECT_EQ(bound(algorithm, "none", 5), std::nullopt) << algorithm;
+    EXPECT_EQ(bound(algorithm, "certified", 4), 3) << algorithm;
+    EXPECT_EQ(bound(algorithm, "auto", 4), 3) << algorithm;
+    EXPECT_EQ(bound(algorithm, "none", 4), std::nullopt) << algorithm;
+  }
+}
+
+TEST(DecomposeRegions, NothingCommonWithinTauHopsSaysSo) {
+  World world = RowWorld();
+  const Result<Decomposition> result = DecomposeRegions(world, {.k = 1, .tau = 100}, 0);
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(
+      result.error().message,
+      HasSubstr("no feature is visible from all stations within tau = 100 hops of any of the 7 stations"));
+}
+
+TEST(DecomposeRegions, ResultNamesWhatItWasMadeWith) {
+  const Decomposition d = Decompose(RowWorld(), {.algorithm = "a3", .k = 2, .tau = 1, .rho = 1}, 77);
+  EXPECT_EQ(d.algorithm, "a3");
+  EXPECT_EQ(d.k, 2);
+  EXPECT_EQ(d.tau, 1);
+  EXPECT_EQ(d.rho, 1);
+  EXPECT_EQ(d.seed, 77);
 }
 
 }  // namespace
