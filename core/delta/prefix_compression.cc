@@ -49,10 +49,12 @@ Result<std::string> CompressAfter(std::string_view prefix, std::string_view byte
 Result<std::string> DecompressAfter(std::string_view prefix, std::string_view frame, size_t num_bytes,
                                     const std::string& what) {
   // Before memory for it is asked for.
-  if (const unsigned long long stated = ZSTD_getFrameContentSize(frame.data(), frame.size());
-      stated != num_bytes) {
-    return MakeError(ErrorCode::kCorrupt, "{}: its payload is no frame of the {} bytes that its head states",
-                     what, num_bytes);
+  const unsigned long long stated = ZSTD_getFrameContentSize(frame.data(), frame.size());
+  if (stated == ZSTD_CONTENTSIZE_ERROR || stated == ZSTD_CONTENTSIZE_UNKNOWN)
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload cannot be unpacked: it has no size", what);
+  if (stated != num_bytes) {
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, but its head states {}", what,
+                     stated, num_bytes);
   }
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax,
@@ -64,10 +66,6 @@ Result<std::string> DecompressAfter(std::string_view prefix, std::string_view fr
   if (ZSTD_isError(found)) {
     return MakeError(ErrorCode::kCorrupt, "{}: its payload cannot be unpacked: {}", what,
                      ZSTD_getErrorName(found));
-  }
-  if (found != num_bytes) {
-    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, but its head states {}", what, found,
-                     num_bytes);
   }
   return bytes;
 }

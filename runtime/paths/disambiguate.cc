@@ -125,7 +125,7 @@ class Planner {
   }
   bool IsFreeAt(const PlanarPose& pose, const Vec2& from, const Vec2& to) const {
     const Vec2 end = pose.FloorFromRobot(to);
-    return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m);
+    return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m) && space_.FaceAt(end) >= 0;
   }
 
   // Straight to one metre before the feature, or as far as the way is free at both poses.

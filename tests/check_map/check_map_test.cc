@@ -1,5 +1,7 @@
 #include "stages/check_map/check_map.h"
 
+#include <limits>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -42,6 +44,22 @@ TEST(CheckMap, ImagesThatCannotBeLocalizedCountAgainstRecallWithTheirReason) {
   EXPECT_EQ(report->figures.at("localized_ratio"), 0);
   EXPECT_EQ(report->figures.count("median_error_m"), 0u);  // no fix, no error
   EXPECT_THAT(report->images[1].rejected, HasSubstr("no such file"));
+}
+
+TEST(IsGrossError, IsWhatIsFarOffTurnedOrNoNumber) {
+  const CheckMapOptions options{.gross_error_m = 0.5, .gross_error_deg = 5};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto is_gross = [&](double error_m, double error_deg) {
+    HeldOutResult result;
+    result.error_m = error_m;
+    result.error_deg = error_deg;
+    return IsGrossError(result, options);
+  };
+  EXPECT_FALSE(is_gross(0.5, 5));
+  EXPECT_TRUE(is_gross(0.51, 5));
+  EXPECT_TRUE(is_gross(0.5, 5.1));
+  EXPECT_TRUE(is_gross(nan, 0));
+  EXPECT_TRUE(is_gross(0, nan));
 }
 
 TEST(CheckMap, GateNamesTheFigureThatFails) {

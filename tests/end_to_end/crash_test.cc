@@ -307,6 +307,16 @@ TEST(Clean, RemovesWhatCairnMadeAndNothingElse) {
                            "small.build/capture/images/holiday.jpg"}) {
     EXPECT_TRUE(left.contains(name)) << name;
   }
+  // Nor is a file of somebody's that a build folder says is its map.
+  const std::string config = workplace.Build("config.mk"), own = folder / "own.cairn";
+  fs::create_directories(folder / "small.build");
+  std::ofstream(own) << "mine";
+  std::ofstream(config) << "#\nMAP := " << own << "\n";
+  const ProgramRun all = RunShell("cairn clean --all " + (folder / "small.build"));
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_THAT(all.out, HasSubstr("kept " + own + ": not cairn's"));
+  EXPECT_EQ(ReadFile(own).value(), "mine");
+  fs::remove(own);
   // A folder that is not a build folder is not touched.
   EXPECT_EQ(RunShell("cairn clean " + (folder / "small.build")).exit_code, 2);
   fs::remove_all(folder / "small.build");

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/preloaded/recorded_call.h"
+#include "tests/recorded/recorded_call.h"
 
 namespace cairn {
 

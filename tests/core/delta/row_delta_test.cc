@@ -115,6 +115,20 @@ TEST_F(PackedMaps, DeltasOfALaterFormatAreRefused) {
   EXPECT_THAT(read.error().message, HasSubstr("later format"));
 }
 
+// So few bytes must not ask for the memory that rows of a large map take.
+TEST_F(PackedMaps, RowsAreOfMapsThatAreSmall) {
+  Remove(700);
+  const std::string old_bytes = *ReadFile(Path("old"));
+  MapDelta delta = Delta();
+  ASSERT_TRUE(delta.has_rows);
+  delta.new_num_bytes = MapDelta::kMaxRowMapBytes + 1;
+  EXPECT_THAT(ApplyMapDelta(delta, old_bytes, Path("old"), "delta").error().message,
+              HasSubstr("delta: states rows of a map that is too large for them"));
+  delta.new_num_bytes = MapDelta::kMaxRowMapBytes;
+  EXPECT_THAT(ApplyMapDelta(delta, old_bytes, Path("old"), "delta").error().message,
+              HasSubstr("but its head states"));
+}
+
 TEST_F(PackedMaps, RowsOfAnUnsignedDeltaMaySayAnything) {
   Remove(700);
   const MapDelta good = Delta();

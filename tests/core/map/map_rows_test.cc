@@ -120,6 +120,12 @@ TEST(MapRows, HeadsThatMakeNoSenseAreRefused) {
               HasSubstr("the rotation of a frame"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.camera_from_given.rotation.coeffs() *= 2; }),
               HasSubstr("the rotation of a frame"));
+  for (const double far : {-2.1e5, 1e308}) {
+    EXPECT_THAT(Refusal([&](MapRows& r) { r.camera_from_given.translation.y() = far; }),
+                HasSubstr("or its place"));
+    EXPECT_THAT(Refusal([&](MapRows& r) { r.floor_from_world.translation.z() = far; }),
+                HasSubstr("or its place"));
+  }
   EXPECT_THAT(Refusal([](MapRows& r) { r.camera_from_given.translation.x() = kNan; }),
               HasSubstr("the rotation of a frame"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.cameras.push_back(r.cameras.back()); }),

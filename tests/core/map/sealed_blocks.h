@@ -17,6 +17,7 @@ struct BlockContents {
   BlockKind kind;
   uint32_t count = 0;
   std::string bytes;
+  bool is_packed = false;
 };
 
 inline std::vector<BlockContents> BlocksOf(const MapFile& file) {
@@ -48,6 +49,7 @@ inline Status WriteSealedBlocks(const std::string& map, const std::vector<BlockC
     for (const BlockContents& block : blocks) {
       const auto kind = static_cast<uint8_t>(block.kind);
       BlockEntry entry{.kind = kind,
+                       .is_packed = block.is_packed,
                        .first = num_elements[kind],
                        .count = block.count,
                        .num_bytes = static_cast<uint32_t>(block.bytes.size()),

@@ -75,6 +75,25 @@ TEST(UnfoldingMap, MoreRegionsThanStationsAreRefusedBeforeTheyAreRead) {
               HasSubstr("2049 regions of 2 stations"));
 }
 
+// Packed, a thousand that are alike take some bytes, and a robot that has nothing else to go by reads them
+// all.
+TEST(UnfoldingMap, LandmarksThatAreAllAlikeAreCounted) {
+  const std::string base = testing::TempDir() + "/unfolding_base.cairn";
+  ASSERT_TRUE(WriteMapRows(FullRows(), base).ok());
+  std::vector<BlockContents> blocks;
+  for (int i = 0; i < 1000; ++i) blocks.push_back({BlockKind::kLandmarks, 1024, "few", true});
+  const MapFile file = *MapFile::Open(base, {});
+  for (BlockContents& block : BlocksOf(file)) {
+    if (block.kind != BlockKind::kLandmarks && block.kind != BlockKind::kLandmarkModels)
+      blocks.push_back(std::move(block));
+  }
+  ASSERT_TRUE(WriteSealedBlocks(*ReadFile(base), blocks, Path()).ok());
+  const Result<MapFile> many = MapFile::Open(Path(), {});
+  ASSERT_FALSE(many.ok());
+  EXPECT_EQ(many.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(many.error().message, HasSubstr("1024000 landmarks, more than a map of"));
+}
+
 TEST(UnfoldingMap, SessionsAreBounded) {
   MapRows rows = FullRows();
   rows.sessions.resize(1001);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/files/file.h"
+#include "core/options/toml_options.h"
 
 namespace cairn {
 namespace {
@@ -30,6 +31,35 @@ std::string WriteToml(const std::string& text) {
                            testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
   EXPECT_TRUE(WriteFileAtomically(path, text).ok());
   return path;
+}
+
+// The parser takes their parts one inside the other.
+TEST(ParseToml, KeysOfVeryManyPartsAreRefused) {
+  const auto parts = [](int num, const std::string& between) {
+    std::string key = "a";
+    for (int i = 1; i < num; ++i) key += between + "a";
+    return key;
+  };
+  EXPECT_TRUE(ParseToml(parts(100, ".") + " = 1\n", "x.toml").ok());
+  for (const std::string& text :
+       {parts(101, ".") + " = 1\n", parts(100'000, ".") + " = 1\n", parts(100'000, " . ") + " = 1\n",
+        "[" + parts(100'000, ".") + "]\n", "[[" + parts(100'000, ".") + "]]\n",
+        "x = {" + parts(100'000, ".") + " = 1}\n", "x = [1, {y = 2, " + parts(100'000, ".") + " = 1}]\n",
+        parts(100'000, ".\"b.c\".'d'.") + " = 1\n",
+        "x = \"a\\\"b\" # '\n" + parts(100'000, ".") + " = 1\n"}) {
+    const Result<toml::table> table = ParseToml(text, "x.toml");
+    ASSERT_FALSE(table.ok()) << text.substr(0, 60);
+    EXPECT_EQ(table.error().code, ErrorCode::kCorrupt);
+    EXPECT_EQ(table.error().message, "x.toml: not TOML for cairn: a key of more than 100 parts");
+  }
+  // Not keys: numbers, texts and remarks.
+  std::string numbers = "x = [0.5";
+  for (int i = 0; i < 300; ++i) numbers += ", 1.5";
+  EXPECT_TRUE(ParseToml(numbers + "]\n", "x.toml").ok());
+  EXPECT_TRUE(
+      ParseToml("x = \"" + parts(300, ".") + "\" # " + parts(300, ".") + "\ny = '" + parts(300, ".") + "'\n",
+                "x.toml")
+          .ok());
 }
 
 TEST(Options, TomlRoundTripKeepsEveryValue) {

@@ -233,6 +233,32 @@ TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) 
   EXPECT_TRUE(check().ok());
 }
 
+// Make would do what it says, and a recipe beside it makes it no better.
+TEST_F(BuildFolderTest, DependenciesThatNoStageWroteAreRefused) {
+  fs::create_directories(paths_.build_dir);
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/recipe", "x\n").ok());
+  EXPECT_TRUE(CheckBuildFolder(paths_.build_dir).ok());
+  const std::string dependencies = paths_.build_dir + "/images.d";
+  ASSERT_TRUE(WriteFileAtomically(dependencies, "CAPTURE_IMAGES += \\\n  /a/1.png\n/a/%: ;\n").ok());
+  EXPECT_TRUE(CheckBuildFolder(paths_.build_dir).ok());
+  ASSERT_TRUE(WriteFileAtomically(dependencies, "X := $(shell touch /tmp/x)\n").ok());
+  const Status status = CheckBuildFolder(paths_.build_dir);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("images.d: is not as extract-features writes it"));
+  fs::remove(dependencies);
+  fs::create_symlink("/nowhere", dependencies);
+  EXPECT_FALSE(CheckBuildFolder(paths_.build_dir).ok());
+}
+
+TEST_F(BuildFolderTest, LinksThatLeadOutAreNotFollowed) {
+  fs::create_directories(paths_.build_dir);
+  fs::create_directory_symlink(testing::TempDir(), paths_.build_dir + "/options");
+  const Status status = WriteBuildFolder(recipe_, paths_);
+  ASSERT_FALSE(status.ok());
+  EXPECT_THAT(status.error().message, HasSubstr("options: is a link"));
+}
+
 TEST(BuildFiles, NamesAreThoseThatABuildWrites) {
   for (const char* name :
        {"features.db", "matches-1-2of3.db.stamp", "matches-2-plan-8-64.db.shards",

@@ -54,6 +54,16 @@ class OutputTest : public testing::Test {
   fs::path folder_;
 };
 
+// Which some commands read and write without being told.
+TEST_F(OutputTest, SignaturesBesideInputsAndOutputsAreFilesOfTheirs) {
+  ASSERT_TRUE(WriteFileAtomically(Path("in.db.signatures"), "").ok());
+  ExpectRefused({"stage", Path("in.db"), "-o", Path("in.db.signatures")});
+  ASSERT_TRUE(WriteFileAtomically(Path("key.signatures"), "").ok());
+  const Outcome outcome = Run({"stage", Path("in.db"), "--more", Path("key.signatures"), "-o", Path("key")});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("key.signatures: is an input, and where the signatures of the output"));
+}
+
 TEST_F(OutputTest, InputIsRefusedUnderWhicheverNameAndArgument) {
   fs::create_symlink("in.db", Path("link.db"));
   ExpectRefused({"stage", Path("in.db"), "-o", Path("in.db")});

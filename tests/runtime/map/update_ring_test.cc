@@ -129,6 +129,26 @@ TEST_F(UpdateRing, SignaturesComeWithTheDeltaAndStayWithBothMaps) {
   EXPECT_EQ(SignaturesInPlace(), Bobs({1, 2, 3}));  // until then epoch 1 was the one before
 }
 
+// Whoever has a delivery in his hands can sign the next map too, and send many such signatures along.
+TEST_F(UpdateRing, SignaturesOfStrangersAreInNobodysWay) {
+  Install(1, {1});
+  Delta(1, 2);
+  Send(2);
+  SignatureList many = ReadSignatures(Path("ring.delta.signatures")).value();
+  const Seal seal = ReadSeal(Path("ring.2")).value();
+  while (many.size() < kMaxSignatures) {
+    const KeyPair key = MakeKeyPair();
+    many.push_back({key.public_key, *SignBytes(SignedBytesOf(seal), key.secret_key)});
+  }
+  ASSERT_TRUE(WriteFileAtomically(Path("ring.delta.signatures"), EncodeSignatures(many)).ok());
+  EXPECT_EQ(Update(Path("ring.delta")), ErrorCode{})
+      << message_;  // with Bob's of the first epoch, one too many
+  EXPECT_EQ(SignaturesInPlace(), Bobs({1, 2}));
+  const std::string next = Delta(2, 3);
+  Send(3);
+  EXPECT_EQ(Update(next), ErrorCode{}) << message_;
+}
+
 TEST_F(UpdateRing, GoingBackIsOneExchange) {
   Install(1, {1});
   Delta(1, 2);

@@ -26,7 +26,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/preloaded/recorded_call.h"
+#include "tests/recorded/recorded_call.h"
 
 namespace {
 
