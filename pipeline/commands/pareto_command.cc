@@ -18,6 +18,7 @@
 #include "core/blocks/map_rows.h"
 #include "core/files/file.h"
 #include "core/modules/program_files.h"
+#include "core/options/toml_options.h"
 #include "pipeline/build/build_step.h"
 #include "pipeline/build/folder_lock.h"
 #include "pipeline/build/recipe.h"
