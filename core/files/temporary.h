@@ -14,9 +14,9 @@
 
 namespace cairn {
 
-// Where a folder is written before it takes the target's place: TARGET.tmp-PROCESS, beside it.
+// Where a file is written before it takes the target's place: TARGET.tmp-PROCESS, beside it.
 std::string TemporaryPath(const std::string& target);
-// The same for a file, under a name that nobody can predict: TARGET.tmp-PROCESS-RANDOM.
+// The same for a file or a folder, under a name that nobody can predict: TARGET.tmp-PROCESS-RANDOM.
 std::string RandomTemporaryPath(const std::string& target);
 // Whether a name is that of such a temporary of `target` (a name; "" = of anything), or of what SQLite, a
 // replaced folder or a temporary's own temporary leaves beside one: TARGET.tmp-PROCESS-journal, -old.

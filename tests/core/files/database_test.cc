@@ -143,6 +143,20 @@ TEST_F(HardenedDatabase, StatementsEndThatTakeMoreStepsThanTheFileCanNeed) {
   EXPECT_EQ(kept.execAndGet("SELECT count(*) FROM t a, t b").getInt(), 16'777'216);
 }
 
+TEST_F(HardenedDatabase, StatementsOfColmapsDatabasesEndToo) {
+  std::string sql = std::string(kColmapSchema) + "; CREATE TABLE t (x); INSERT INTO t VALUES (1)";
+  for (int i = 0; i < 12; ++i) sql += "; INSERT INTO t SELECT * FROM t";
+  for (const char* mode : {"", "PRAGMA journal_mode = WAL;"}) {
+    const std::string path = Write(mode + sql);
+    const Status status = WithDatabaseErrors(path, [&]() -> Status {
+      OpenColmapDatabase(path).value().execAndGet("SELECT sum(a.x + b.x) FROM t a, t b");
+      return Ok();
+    });
+    ASSERT_FALSE(status.ok()) << mode;
+    EXPECT_THAT(status.error().message, HasSubstr("shows more rows than a file of its size can hold"));
+  }
+}
+
 TEST_F(HardenedDatabase, HeadersSayHowLongTheFileIs) {
   const std::string path = Write("PRAGMA page_size = 1024; CREATE TABLE t (x); CREATE TABLE u (x)");
   const std::string bytes = ReadFile(path).value();

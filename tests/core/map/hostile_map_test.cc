@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/blocks/map_rows.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
@@ -368,6 +369,21 @@ TEST_F(HostileMap, TablesWithoutEndAreRefused) {
     } else {
       EXPECT_THAT(file.error().message, HasSubstr("hostile.cairn")) << table;
     }
+  }
+}
+
+TEST_F(HostileMap, TablesWithoutEndOfAnOldMapAreRefused) {
+  const std::string golden = GOLDEN_DIR "/map_1.0.cairn";
+  const std::string bytes = ReadFile(golden).value();
+  SQLite::Database database(golden, SQLite::OPEN_READONLY);
+  for (const char* table : {"landmarks", "stations"}) {
+    const int root =
+        database.execAndGet(fmt::format("SELECT rootpage FROM sqlite_schema WHERE name = '{}'", table))
+            .getInt();
+    WriteBytes(path_, Endless(bytes, static_cast<size_t>(root), false, 0));
+    const Result<MapRows> migrated = ReadMapRowsVersion1(path_);
+    ASSERT_FALSE(migrated.ok()) << table;
+    EXPECT_EQ(migrated.error().code, ErrorCode::kCorrupt) << table;
   }
 }
 
