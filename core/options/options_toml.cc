@@ -33,6 +33,9 @@ std::string TextFromToml(const toml::node& node) {
 
 // toml++ takes a key's parts, and what they lead to, one inside the other, without a limit of its own.
 constexpr int kMaxPartsOfAKey = 100;
+// In all of a text, whatever they stand in: quotes may hide a key from MostPartsOfAKey.  (20,000 did no
+// harm.)
+constexpr int64_t kMaxDots = 10'000;
 
 // Of dotted keys and headers of tables, wherever they may stand; numbers have one dot.
 int MostPartsOfAKey(const std::string& contents) {
@@ -67,6 +70,8 @@ Result<toml::table> ParseToml(const std::string& contents, const std::string& pa
   if (MostPartsOfAKey(contents) > kMaxPartsOfAKey)
     return MakeError(ErrorCode::kCorrupt, "{}: not TOML for cairn: a key of more than {} parts", path,
                      kMaxPartsOfAKey);
+  if (std::count(contents.begin(), contents.end(), '.') > kMaxDots)
+    return MakeError(ErrorCode::kCorrupt, "{}: not TOML for cairn: more than {} dots", path, kMaxDots);
   try {
     return toml::table(toml::parse(contents, path));
   } catch (const toml::parse_error& error) {

@@ -22,6 +22,13 @@ using Contents = std::map<std::string, std::string>;
 
 // Epochs 1, 2 and 3 of a small map, a delta from the second to the third, a key; and a folder to work in.
 class SignedEpochs : public testing::Test {
+ public:
+  // A command that must succeed.
+  static void Run(const std::string& command) {
+    const ProgramRun run = RunShell(command);
+    EXPECT_EQ(run.exit_code, 0) << command << ": " << run.err;
+  }
+
  protected:
   explicit SignedEpochs(const std::string& name) : folder_(name), work_(folder_ / "work") {
     std::filesystem::create_directories(work_);
@@ -32,11 +39,6 @@ class SignedEpochs : public testing::Test {
           folder_ / epoch);
     Run("cairn update delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
         folder_ / "delta");
-  }
-
-  static void Run(const std::string& command) {
-    const ProgramRun run = RunShell(command);
-    EXPECT_EQ(run.exit_code, 0) << command << ": " << run.err;
   }
 
   std::string Bytes(const std::string& name) const { return ReadFile(folder_ / name).value(); }
@@ -80,16 +82,12 @@ class RingEpochs {
  public:
   // `folder`: of SignedEpochs; the delta gets signatures.
   explicit RingEpochs(const TemporaryFolder& folder) : work_(folder / "work") {
-    const auto run = [](const std::string& command) {
-      const ProgramRun done = RunShell(command);
-      EXPECT_EQ(done.exit_code, 0) << command << ": " << done.err;
-    };
-    run("cairn keygen " + folder / "bob");
-    run("cairn keygen " + folder / "carol");
-    run("cairn keys make alice=" + folder / "key.pub" + " bob=" + folder / "bob.pub" +
-        " carol=" + folder / "carol.pub" + " --threshold 2 -o " + folder / "ring");
+    SignedEpochs::Run("cairn keygen " + folder / "bob");
+    SignedEpochs::Run("cairn keygen " + folder / "carol");
+    SignedEpochs::Run("cairn keys make alice=" + folder / "key.pub" + " bob=" + folder / "bob.pub" +
+                      " carol=" + folder / "carol.pub" + " --threshold 2 -o " + folder / "ring");
     for (const std::string epoch : {"1", "2", "3"})
-      run("cairn sign " + folder / epoch + " --key " + folder / "bob" + " --add");
+      SignedEpochs::Run("cairn sign " + folder / epoch + " --key " + folder / "bob" + " --add");
     std::filesystem::rename(folder / "3.signatures", folder / "delta.signatures");
     ring_ = ReadTrustedKeys(folder / "ring").value();
     const auto bytes = [&](const std::string& name) { return ReadFile(folder / name).value(); };

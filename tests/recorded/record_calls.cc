@@ -5,7 +5,6 @@
 //   stages)
 // Each call is done and recorded while no other is.
 
-#include <dirent.h>
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/file.h>

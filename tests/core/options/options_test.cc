@@ -52,6 +52,12 @@ TEST(ParseToml, KeysOfVeryManyPartsAreRefused) {
     EXPECT_EQ(table.error().code, ErrorCode::kCorrupt);
     EXPECT_EQ(table.error().message, "x.toml: not TOML for cairn: a key of more than 100 parts");
   }
+  // A string of several lines that ends with five quotes looks like the beginning of another one.
+  const Result<toml::table> hidden =
+      ParseToml("x = [\"\"\"\n\"\"\"\"\", {" + parts(100'000, ".") + " = 1}]\n", "x.toml");
+  ASSERT_FALSE(hidden.ok());
+  EXPECT_EQ(hidden.error().message, "x.toml: not TOML for cairn: more than 10000 dots");
+  EXPECT_TRUE(ParseToml("x = '''\n" + std::string(99, '.') + "\n'''\n", "x.toml").ok());
   // Not keys: numbers, texts and remarks.
   std::string numbers = "x = [0.5";
   for (int i = 0; i < 300; ++i) numbers += ", 1.5";
