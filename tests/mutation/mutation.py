@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
-"""Would the tests notice?  Changes one operator or number of a room's sources at a time, compiles the changed source, links it into
-the room's tests before the libraries, runs them, and lists the changes that no test noticed.
+"""Would the tests notice?  Changes one operator or number of a room's sources at a time, runs the room's tests, and lists the changes
+that no test noticed.
+
+All changes are compiled at once, and chosen as the tests run (schemata.py); those that a constant expression or a template's argument
+needs are compiled one by one.  A change is tried by the suites that come by it, the quickest first.
 
 A survivor is a line whose meaning no test checks: write the test, or delete the line.  Changes that mean the same (a bound that is
 never reached, a tie that cannot be) stand in rooms.toml with the reason, and are not drawn.
@@ -21,69 +24,22 @@ import random
 import re
 import resource
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 import tomllib
 
-OPERATORS = (("<", "<="), ("<=", "<"), (">", ">="), (">=", ">"), ("==", "!="), ("!=", "=="), ("<", ">"), (">", "<"), ("+", "-"), ("-", "+"),
-             ("*", "/"), ("/", "*"), ("&&", "||"), ("||", "&&"), ("+=", "-="), ("-=", "+="))
-WORDS = (("true", "false"), ("false", "true"), ("std::min", "std::max"), ("std::max", "std::min"), ("continue;", "break;"),
-         ("break;", "continue;"), ("std::less", "std::greater"), ("std::greater", "std::less"), ("++", "--"))
+from changes import changes_of, is_listed
+from schemata import schema_of
+
 MEMORY_BYTES = 8 << 30
 FILE_BYTES = 1 << 30
+COMPILE_LIMIT_S = 1200
+NO_SUCH_CHANGE = 97  # chosen.h
 # A share of the changes is too few where the room's figure would give so few, or fewer, with less than this probability.
 SIGNIFICANCE = 0.01
-
-
-@dataclasses.dataclass(frozen=True)
-class Change:
-    file: str
-    line: int  # from 0
-    column: int
-    old: str
-    new: str
-
-    def applied(self, text):
-        lines = text.split("\n")
-        line = lines[self.line]
-        lines[self.line] = line[: self.column] + self.new + line[self.column + len(self.old) :]
-        return "\n".join(lines)
-
-    def said(self, text):
-        return f"{self.file}:{self.line + 1}  {self.old} -> {self.new}   {text.split(chr(10))[self.line].strip()}"
-
-
-def changes_of(file, text):
-    """All changes of a source, in the order of its lines."""
-    found, in_comment = [], False
-    for number, line in enumerate(text.split("\n")):
-        stripped = line.strip()
-        if in_comment or stripped.startswith("/*"):
-            in_comment = "*/" not in stripped
-            continue
-        # Of the same length, and nothing inside strings, characters and comments.
-        code = re.sub(r'"(\\.|[^"\\])*"' + r"|'(\\.|[^'\\])'", lambda match: '"' + "_" * (len(match.group()) - 2) + '"', line).split("//")[0]
-        if not code.strip() or stripped.startswith(("#", "template", "using ", "static_assert", "namespace")):
-            continue
-        for old, new in OPERATORS:
-            found += [Change(file, number, match.start(), old, new) for match in re.finditer(rf"(?<=\s){re.escape(old)}(?=\s|$)", code)]
-        for old, new in WORDS:
-            end = r"(?!\w)" if old[-1].isalpha() else ""
-            found += [Change(file, number, match.start(), old, new) for match in re.finditer(rf"(?<![\w:]){re.escape(old)}{end}", code)]
-        for match in re.finditer(r"(?<![\w.])(\d+\.\d+|\d+)(?![\w.])", code):
-            value = match.group()
-            new = repr(float(value) * 1.5 + 0.1) if "." in value else str(int(value) + 1)
-            found.append(Change(file, number, match.start(), value, new))
-    return found
-
-
-def is_listed(change, text, same):
-    """Whether rooms.toml lists it as a change that means the same."""
-    line = text.split("\n")[change.line].strip()
-    return any(change.file.endswith("/" + entry["file"]) and line == entry["line"] and f"{change.old} -> {change.new}" == entry["change"]
-               and entry.get("column") in (None, change.column) for entry in same)
 
 
 def unknown_entries(root, room, same):
@@ -138,6 +94,13 @@ class Build:
                 command[command.index(option) + 1] = f"{to}.d"
         return command
 
+    def together(self, sources):
+        """The sources that one command compiles, of each such command."""
+        groups = {}
+        for source in sources:
+            groups.setdefault(tuple(self.compile(source, "source", "object")), []).append(source)
+        return list(groups.values())
+
     def precompile(self, source, folder):
         """Compiles the header that the compiler puts before `source` for what `compile` says; whatever compiles it after that has it."""
         command = self.commands[source.resolve()]
@@ -154,89 +117,219 @@ class Build:
         self.headers[str(header)] = str(to)
 
     def link(self, test, changed, to):
-        """The command that links a test with an object that stands before its libraries: what it defines is not taken from there."""
+        """The command that links a test with objects that stand before its libraries: what they define is not taken from there."""
         said = subprocess.run(["ninja", "-t", "commands", test], cwd=self.folder, capture_output=True, text=True, check=True).stdout
         line = next(line for line in reversed(said.splitlines()) if f" -o {test} " in line)
         words = shlex.split(line)
         words = words[words.index("&&") + 1 :]
         words = words[: words.index("&&")] if "&&" in words else words
         place = words.index("-o")
-        return words[:place] + ["-Wl,--allow-multiple-definition", str(changed), "-o", str(to)] + words[place + 2 :]
+        return words[:place] + ["-Wl,--allow-multiple-definition", *map(str, changed), "-o", str(to)] + words[place + 2 :]
+
+
+@dataclasses.dataclass
+class Suite:
+    """Tests of one program that are run together."""
+    program: pathlib.Path
+    options: list
+    time_s: float = 0
+    reached: bytes = b""
+
+    def command(self):
+        return [str(self.program), *self.options, "--gtest_brief=1", "--gtest_fail_fast"]
+
+
+def run(command, folder, cpu_limit_s, env=None, errors=subprocess.DEVNULL):
+    """The exit code of a command, and how long it took; a command that takes more is stopped."""
+    def limits():
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(cpu_limit_s), math.ceil(cpu_limit_s) + 1))
+        os.setpgid(0, 0)
+
+    quiet, start = subprocess.DEVNULL, time.monotonic()
+    child = subprocess.Popen(command, cwd=folder, env=env, stdin=quiet, stdout=quiet, stderr=errors, preexec_fn=limits)
+    try:
+        # One that waits for ever has no time of its own.
+        code = child.wait(60 + 4 * cpu_limit_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(child.pid, 9)
+        child.wait()
+        code = -9
+    return code, time.monotonic() - start
 
 
 class Room:
-    """The sources of a room and its tests; `slots` of changes are tried at once."""
+    """The sources of a room and its tests; changes are known by numbers from 1."""
 
-    def __init__(self, root, build, name, tests, num_slots, folder):
-        self.root, self.build, self.name, self.tests = root, build, name, tests
-        self.folder = folder
-        self.slots = queue.Queue()
-        for slot in range(num_slots):
-            (self.folder / str(slot)).mkdir()
-            self.slots.put(slot)
-        for source in sources_of(root, name):
+    def __init__(self, root, build, tests, folder, texts, changes):
+        self.root, self.build, self.tests, self.folder, self.texts = root, build, tests, folder, texts
+        self.changes = changes
+        self.suites = []
+        self.alone = set()
+        shutil.copy(pathlib.Path(__file__).with_name("chosen.h"), folder)
+        for source in texts:
             build.precompile(root / source, folder)
-        self.time_limit_s = {}
 
-    def run(self, command, time_limit_s, env=None):
-        def limits():
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-            resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
-            os.setpgid(0, 0)
+    def compile(self, source, changed, to, *options):
+        command = self.build.compile(self.root / source, changed, to)
+        command = [word for word in command if not word.startswith("-W")] + ["-w", "-Wno-narrowing", *options]
+        with open(f"{to}.errors", "w") as errors:
+            code, _ = run(command, self.build.folder, COMPILE_LIMIT_S, errors=errors)
+        return code, pathlib.Path(f"{to}.errors").read_text(errors="replace")
 
-        quiet = subprocess.DEVNULL
-        child = subprocess.Popen(command, cwd=self.build.folder, env=env, stdin=quiet, stdout=quiet, stderr=quiet, preexec_fn=limits)
-        try:
-            return child.wait(time_limit_s)
-        except subprocess.TimeoutExpired:
-            os.killpg(child.pid, 9)
-            child.wait()
-            return -9
+    def program(self, test, objects, label):
+        # Beside the programs that tests start.
+        to = self.build.folder / f"mutant_{os.getpid()}_{label}_{test}"
+        code, _ = run(self.build.link(test, objects, to), self.build.folder, COMPILE_LIMIT_S)
+        return to if code == 0 else None
 
-    def outcome(self, source, text):
-        """Of a changed source: "noticed", "survived" or, where it does not compile, "broken"."""
-        slot = self.slots.get()
-        try:
-            folder = self.folder / str(slot)
-            changed, compiled = folder / pathlib.Path(source).name, folder / "changed.o"
-            changed.write_text(text)
-            if self.run(self.build.compile(self.root / source, changed, compiled), 600):
+    def compile_schemata(self):
+        """Of all sources together that are compiled alike; what the compiler does not take is left for later, one by one."""
+        objects = []
+        for number, group in enumerate(self.build.together([self.root / source for source in self.texts])):
+            names = [str(source.relative_to(self.root)) for source in group]
+            to, joined = self.folder / f"schema_{number}.o", self.folder / f"schema_{number}.cc"
+            active = {k: change for k, change in self.changes.items() if change.file in names}
+            for attempt in range(12):
+                parts = [f'#include "{self.folder / "chosen.h"}"\n']
+                for name in names:
+                    schema, lacking = schema_of(self.texts[name], {k: change for k, change in active.items() if change.file == name})
+                    parts.append(f'#line 1 "{self.root / name}"\n{schema}\n')
+                    for k in lacking:
+                        self.alone.add(k)
+                        active.pop(k)
+                joined.write_text("".join(parts))
+                code, said = self.compile(names[0], joined, to, "-fsyntax-only", "-fmax-errors=0")
+                if code == 0:
+                    code, said = self.compile(names[0], joined, to)
+                    if code == 0:
+                        break
+                refused = self.refused(said, active, attempt)
+                if not refused:
+                    raise SystemExit(f"{names[0]} and those beside it cannot be compiled together:\n{said[:2000]}")
+                self.alone |= refused
+                for k in refused:
+                    active.pop(k)
+            else:
+                raise SystemExit(f"{names[0]} and those beside it: the compiler still finds errors:\n{said[:2000]}")
+            objects.append(to)
+        return objects
+
+    def refused(self, said, active, attempt):
+        """The changes of lines with errors; where none is on such a line, of all that the compiler speaks of, and near them."""
+        places = re.findall(r"^(/[^:\n]*):(\d+):\d+: +(\w+)", said, re.MULTILINE)
+        for near, kinds in ((0, ("error", "fatal")), (0, ("error", "note", "required")), (3, ("error", "note", "required"))):
+            lines = {(str(self.root / change.file), change.line + 1 + d): set() for change in active.values() for d in range(-near, near + 1)}
+            for k, change in active.items():
+                for d in range(-near, near + 1):
+                    lines[str(self.root / change.file), change.line + 1 + d].add(k)
+            found = set()
+            for file, line, kind in places:
+                if kind in kinds or near:
+                    found |= lines.get((file, int(line)), set())
+            if found:
+                return found
+        return set(active) if attempt < 11 and active else set()
+
+    def find_suites(self, objects):
+        """Links and runs all tests once; False where some fail, as they are."""
+        for place, test in enumerate(self.tests):
+            name, *options = test.split()
+            program = next((suite.program for suite in self.suites if suite.program.name.endswith(f"_all_{name}")), None) or self.program(name, objects, "all")
+            if program is None:
+                raise SystemExit(f"{name}: cannot be linked with the changed sources")
+            listed = subprocess.run([str(program), *options, "--gtest_list_tests"], cwd=self.build.folder, capture_output=True, text=True, check=False,
+                                    env={**os.environ, "TEST_TMPDIR": str(self.folder)})
+            suites = {}
+            for line in listed.stdout.splitlines():
+                if line.startswith("  "):
+                    suites.setdefault(suite, []).append(suite + line.split()[0])
+                else:
+                    suite = line.split("#")[0].strip()
+            filters = [["--gtest_filter=" + ":".join(names)] for names in suites.values()] or [options]
+            self.suites += [Suite(program, filter) for filter in filters if not any((filter, program) == (suite.options, suite.program) for suite in self.suites)]
+        file = self.folder / "reached"
+        for suite in self.suites:
+            file.write_bytes(bytes(max(self.changes) + 1))
+            code, suite.time_s = run(suite.command(), self.build.folder, 600, {**os.environ, "TEST_TMPDIR": str(self.folder), "CAIRN_REACHED": str(file)})
+            if code:
+                return False
+            suite.reached = file.read_bytes()
+        self.suites.sort(key=lambda suite: suite.time_s)
+        return True
+
+    def outcome(self, k, slot):
+        """Of a change: "noticed", "survived", "not reached" or, where it does not compile, "broken"."""
+        folder = self.folder / str(slot)
+        folder.mkdir(exist_ok=True)
+        programs, env = {}, {**os.environ, "TEST_TMPDIR": str(folder)}
+        suites = self.suites
+        if k in self.alone:
+            change = self.changes[k]
+            changed, compiled = folder / pathlib.Path(change.file).name, folder / "changed.o"
+            changed.write_text(change.applied(self.texts[change.file]))
+            if self.compile(change.file, changed, compiled)[0]:
                 return "broken"
-            for test in self.tests:
-                name, *options = test.split()
-                # Beside the programs that tests start.
-                program = self.build.folder / f"mutant_{os.getpid()}_{slot}_{name}"
-                if self.run(self.build.link(name, compiled, program), 600):
+        else:
+            env["CAIRN_CHANGE"] = str(k)
+            suites = [suite for suite in suites if suite.reached[k]]
+            if not suites:
+                return "not reached"
+        try:
+            for suite in suites:
+                program = suite.program
+                if k in self.alone:
+                    if program not in programs:
+                        programs[program] = self.program(program.name.split("_all_")[1], [compiled], slot)
+                    program = programs[program]
+                    if program is None:
+                        return "broken"
+                code, _ = run([str(program), *suite.command()[1:]], self.build.folder, 4 + 5 * suite.time_s, env)
+                if code == NO_SUCH_CHANGE:
                     return "broken"
-                start = time.monotonic()
-                code = self.run([str(program), *options, "--gtest_brief=1", "--gtest_fail_fast"], self.time_limit_s.get(test, 600),
-                                {**os.environ, "TEST_TMPDIR": str(folder)})
-                program.unlink()
                 if code:
                     return "noticed"
-                self.time_limit_s.setdefault(test, 30 + 4 * (time.monotonic() - start))
             return "survived"
         finally:
-            self.slots.put(slot)
+            for program in programs.values():
+                if program:
+                    program.unlink()
+
+    def remove_programs(self):
+        for program in {suite.program for suite in self.suites}:
+            program.unlink(missing_ok=True)
 
 
-def tried(room, changes, num, jobs, texts):
+def tried(room, num, jobs):
     """How many of a room's changes were noticed, survived and did not compile; says which survived."""
     counts = {"noticed": 0, "survived": 0, "broken": 0}
+    slots = queue.Queue()
+    for slot in range(jobs):
+        slots.put(slot)
+
+    def outcome(k):
+        slot = slots.get()
+        try:
+            return room.outcome(k, slot)
+        finally:
+            slots.put(slot)
+
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        waiting, rest = {}, iter(changes)
+        waiting, rest = {}, iter(room.changes)
         while True:
             while len(waiting) < jobs and counts["noticed"] + counts["survived"] + len(waiting) < num:
-                if (change := next(rest, None)) is None:
+                if (k := next(rest, None)) is None:
                     break
-                waiting[pool.submit(room.outcome, change.file, change.applied(texts[change.file]))] = change
+                waiting[pool.submit(outcome, k)] = k
             if not waiting:
                 return counts
             for done in concurrent.futures.wait(waiting, return_when=concurrent.futures.FIRST_COMPLETED).done:
-                change, outcome = waiting.pop(done), done.result()
-                counts[outcome] += 1
-                if outcome == "survived":
-                    print(f"survived {change.said(texts[change.file])}", flush=True)
+                change, outcome_of = room.changes[waiting.pop(done)], done.result()
+                counts["survived" if outcome_of == "not reached" else outcome_of] += 1
+                if outcome_of in ("survived", "not reached"):
+                    print(f"{outcome_of}: {change.said(room.texts[change.file])}", flush=True)
 
 
 def main():
@@ -274,13 +367,23 @@ def main():
     texts = {source: (root / source).read_text() for source in sources}
     changes = [change for source in sources for change in changes_of(source, texts[source]) if not is_listed(change, texts[source], same)]
     draw.shuffle(changes)
+    if not changes:
+        print(f"{arguments.room}: nothing to change", file=sys.stderr)
+        return 2
+    print(f"{arguments.room}: {len(changes)} changes, {min(arguments.num, len(changes))} of them tried, seed {arguments.seed}", flush=True)
+    # A few more, for those that do not compile.
+    drawn = dict(enumerate(changes[: arguments.num * 4 // 3 + 4], 1))
     with tempfile.TemporaryDirectory(prefix="mutation_", dir=arguments.build) as folder:
-        room = Room(root, Build(arguments.build.resolve()), arguments.room, entry["tests"], arguments.jobs, pathlib.Path(folder).resolve())
-        if not changes or room.outcome(sources[0], texts[sources[0]]) != "survived":
-            print(f"{arguments.room}: {'nothing to change' if not changes else 'its tests fail as they are'}", file=sys.stderr)
-            return 2
-        print(f"{arguments.room}: {len(changes)} changes, {arguments.num} of them tried, seed {arguments.seed}", flush=True)
-        counts = tried(room, changes, arguments.num, arguments.jobs, texts)
+        room = Room(root, Build(arguments.build.resolve()), entry["tests"], pathlib.Path(folder).resolve(), texts, drawn)
+        try:
+            if not room.find_suites(room.compile_schemata()):
+                print(f"{arguments.room}: its tests fail as they are", file=sys.stderr)
+                return 2
+            print(f"{len(drawn) - len(room.alone)} compiled at once, {len(room.alone)} alone; {len(room.suites)} suites of tests, "
+                  f"{sum(suite.time_s for suite in room.suites):.0f} s", flush=True)
+            counts = tried(room, arguments.num, arguments.jobs)
+        finally:
+            room.remove_programs()
     num = counts["noticed"] + counts["survived"]
     print(f"{arguments.room}: {counts['noticed']} of {num} changes noticed ({100 * counts['noticed'] / max(1, num):.0f} %; {entry['noticed']} % wanted), "
           f"{counts['broken']} did not compile")
