@@ -53,6 +53,13 @@ def sources_of(root, room):
     return sorted(str(path.relative_to(root)) for path in (root / room).glob("*.cc"))
 
 
+def is_at(change, place):
+    """Whether a change is in a file, or on the lines of it that are named."""
+    name, _, lines = place.partition(":")
+    first, _, last = lines.partition("-")
+    return pathlib.Path(change.file).name == name and (not lines or int(first) <= change.line + 1 <= int(last or first))
+
+
 def commit_of(root):
     said = subprocess.run(["git", "-C", str(root), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
     return said.stdout.strip() if said.returncode == 0 else "0"
@@ -340,7 +347,7 @@ def main():
     parser.add_argument("--seed", help="of the draw, any text [the commit]")
     parser.add_argument("--share", action="store_true", help="a few changes of a room that the seed chooses: fails where significantly fewer are noticed")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="changes tried at once [all cores]")
-    parser.add_argument("--files", nargs="+", default=[], help="of the room, these alone")
+    parser.add_argument("--files", nargs="+", default=[], help="of the room, these alone; with lines, a.cc:12 b.cc:7-9, only what is there")
     arguments = parser.parse_args()
     root = pathlib.Path(__file__).resolve().parents[2]
     rooms = tomllib.loads(pathlib.Path(__file__).with_name("rooms.toml").read_text())
@@ -363,9 +370,10 @@ def main():
         print(f"rooms.toml: {arguments.room}: no source has the change {stale}", file=sys.stderr)
         return 2
 
-    sources = [source for source in sources_of(root, arguments.room) if not arguments.files or pathlib.Path(source).name in arguments.files]
-    texts = {source: (root / source).read_text() for source in sources}
-    changes = [change for source in sources for change in changes_of(source, texts[source]) if not is_listed(change, texts[source], same)]
+    texts = {source: (root / source).read_text() for source in sources_of(root, arguments.room)}
+    changes = [change for source, text in texts.items() for change in changes_of(source, text)
+               if not is_listed(change, text, same) and (not arguments.files or any(is_at(change, place) for place in arguments.files))]
+    texts = {source: texts[source] for source in texts if any(change.file == source for change in changes)}
     draw.shuffle(changes)
     if not changes:
         print(f"{arguments.room}: nothing to change", file=sys.stderr)

@@ -15,7 +15,7 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 from changes import changes_of, is_listed  # noqa: E402
-from mutation import probability_of_at_most  # noqa: E402
+from mutation import is_at, probability_of_at_most  # noqa: E402
 from schemata import schema_of  # noqa: E402
 
 SOURCE = """#include "sum.h"
@@ -71,6 +71,13 @@ class Changes(unittest.TestCase):
         self.assertTrue(is_listed(change, text, [entry]))
         for key, value in (("file", "b.cc"), ("line", "x = a < c;"), ("change", "< -> >"), ("column", 3)):
             self.assertFalse(is_listed(change, text, [{**entry, key: value}]), key)
+
+    def test_places_are_files_and_lines(self):
+        change = changes_of("room/a.cc", "int x;\nx = a < b;")[0]
+        for place in ("a.cc", "a.cc:2", "a.cc:1-2", "a.cc:2-9"):
+            self.assertTrue(is_at(change, place), place)
+        for place in ("b.cc", "a.cc:1", "a.cc:3-9", "room"):
+            self.assertFalse(is_at(change, place), place)
 
     def test_a_share_is_too_few_by_the_binomial_distribution(self):
         self.assertAlmostEqual(probability_of_at_most(0, 2, 0.9), 0.01)
