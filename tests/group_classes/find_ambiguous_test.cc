@@ -1,5 +1,7 @@
 #include "stages/group_classes/find_ambiguous.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -164,6 +166,15 @@ TEST(FindAmbiguous, EqualLooksAreToldApartWhereTheRuleIsOff) {
   // Without a radius only equal looks are one.
   EXPECT_THAT(FindAmbiguous({Look(0.1, 0, 0, 5), Look(0.1, 0, 5, 5), Look(0.15, 0, 9, 5)}, {}, {}),
               ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous, Ambiguity::kNone));
+}
+
+TEST(FindAmbiguous, WhatHasNothingInCommonIsWithinARadiusOfARightAngle) {
+  FindAmbiguousOptions options;
+  options.min_separation_ratio = 1;
+  const std::vector<ClassAppearance> wide = {Look(0, 1.6, 0, 5), Look(M_PI / 2, 1.6, 5, 5)},
+                                     narrower = {Look(0, 1.5, 0, 5), Look(M_PI / 2, 1.5, 5, 5)};
+  EXPECT_THAT(FindAmbiguous(wide, {}, options), ElementsAre(Ambiguity::kAmbiguous, Ambiguity::kAmbiguous));
+  EXPECT_THAT(FindAmbiguous(narrower, {}, options), ElementsAre(Ambiguity::kNone, Ambiguity::kNone));
 }
 
 TEST(DescribeClass, RadiusOfEqualDescriptorsIsZero) {
