@@ -97,6 +97,9 @@ Status CheckOptions(const OptionTable& table) {
       CAIRN_RETURN_IF_ERROR(CheckRange(option, **integer));
     if (auto* const* number = std::get_if<double*>(&option.value); number != nullptr && !WordOf(option))
       CAIRN_RETURN_IF_ERROR(CheckRange(option, **number));
+    if (auto* const* numbers = std::get_if<std::vector<double>*>(&option.value)) {
+      for (const double number : **numbers) CAIRN_RETURN_IF_ERROR(CheckRange(option, number));
+    }
     auto* const* text = std::get_if<std::string*>(&option.value);
     if (text && !option.choices.empty() &&
         std::find(option.choices.begin(), option.choices.end(), **text) == option.choices.end()) {

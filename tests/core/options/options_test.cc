@@ -95,6 +95,18 @@ TEST(Options, AWordStandsForANumberOutsideOfTheRange) {
               testing::HasSubstr("option ratio: expected auto, or a number, found 'most'"));
 }
 
+TEST(Options, ARangeIsOfEachNumberOfAList) {
+  std::vector<double> ratios = {0, 0.5, 1};
+  const OptionTable table = {{.name = "ratios", .value = &ratios, .help = "ratios", .min = 0, .max = 1}};
+  EXPECT_TRUE(CheckOptions(table).ok());
+  for (const double outside : {-0.1, 1.1}) {
+    ratios[1] = outside;
+    EXPECT_THAT(CheckOptions(table).error().message, testing::HasSubstr("must be in [0, 1]"));
+  }
+  ratios.clear();
+  EXPECT_TRUE(CheckOptions(table).ok());
+}
+
 TEST(Options, UnknownKeyNamesTheNearestOne) {
   Fields fields;
   const Status status = ReadOptionsFile(WriteToml("flag = true\nmin_cuont = 3\n"), Describe(&fields));
