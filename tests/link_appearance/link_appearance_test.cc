@@ -5,13 +5,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "core/world/appearance.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/picture.h"
 #include "tests/link_appearance/graphs.h"
+#include "tests/link_appearance/matches.h"
 
 namespace cairn::link_appearance {
 namespace {
@@ -20,34 +20,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-ImageLinks ImagesOf(const AppearanceGraph& graph) {
-  ImageLinks images{.links = graph.Links()};
-  for (int i = 0; i < graph.num_nodes(); ++i) {
-    images.images.push_back({static_cast<ImageId>(i + 1), fmt::format("image{}.jpg", i), 1});
-  }
-  return images;
-}
-
 std::string TemporaryPath(const std::string& name) { return testing::TempDir() + "/" + name; }
-
-// A COLMAP database of images and verified pairs without features.
-void WriteMatches(const std::string& path, const ImageLinks& images, TwoViewConfig config) {
-  std::remove(path.c_str());
-  SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-  database.exec(kColmapSchema);
-  WriteDatabaseCamera(database, *ParseCamera("PINHOLE,640,480,500,500,320,240"));
-  for (const DatabaseImage& image : images.images) WriteDatabaseImage(database, image);
-  for (const AppearanceLink& link : images.links) {
-    TwoViewGeometry geometry;
-    geometry.image_id1 = images.images[link.node1].image_id;
-    geometry.image_id2 = images.images[link.node2].image_id;
-    geometry.config = config;
-    for (int i = 0; i < link.num_inliers; ++i) {
-      geometry.inliers.push_back({static_cast<KeypointIdx>(i), static_cast<KeypointIdx>(i)});
-    }
-    WriteDatabaseTwoViewGeometry(database, geometry);
-  }
-}
 
 TEST(LinkAppearance, KeepsTheMiddleOfAStarAndSaysThatOneIsNeeded) {
   const Result<LinkAppearanceResult> result =
@@ -187,6 +160,20 @@ TEST(ReadImageLinks, PairsOfUnknownImagesAreCorrupt) {
   ASSERT_FALSE(links.ok());
   EXPECT_EQ(links.error().code, ErrorCode::kCorrupt);
   EXPECT_THAT(links.error().message, HasSubstr("images 1 and 2"));
+}
+
+TEST(ReadImageLinks, APairIsOfTwoImagesAndHasAsManyInliersAsCanBe) {
+  const std::string path = TemporaryPath("pairs.db");
+  const auto reads_with = [&](const std::string& change) {
+    WriteMatches(path, ImagesOf(PathGraph(2)), TwoViewConfig::kCalibrated);
+    SQLite::Database(path, SQLite::OPEN_READWRITE).exec("UPDATE two_view_geometries SET " + change);
+    return ReadImageLinks(path, 15).ok();
+  };
+  EXPECT_TRUE(reads_with("rows = 0"));
+  EXPECT_FALSE(reads_with("rows = -1"));
+  EXPECT_TRUE(reads_with("rows = 2147483647"));
+  EXPECT_FALSE(reads_with("rows = 2147483648"));
+  EXPECT_FALSE(reads_with("pair_id = " + std::to_string(PairIdFromImageIds(2, 2))));
 }
 
 TEST(AppearanceDatabase, ReadsBackWhatWasWrittenAndHasTheSameBytesAgain) {
