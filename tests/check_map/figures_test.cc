@@ -187,6 +187,17 @@ TEST_F(FiguresTest, AFitOfTheFramesLeavesTheErrorsOfFixesThatAgree) {
   EXPECT_LT(Figure("rig_offset_deg"), 5);
 }
 
+TEST_F(FiguresTest, ImagesWithoutATruePoseHaveNoErrors) {
+  std::vector<HeldOutImage> images = *images_;
+  for (HeldOutImage& image : images) image.cam_from_world.reset();
+  NoProgress progress;
+  const auto report = CheckMap(*map_, images, {}, 1, progress);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->figures.at("num_localized"), 12);
+  EXPECT_FALSE(report->figures.contains("similarity_scale"));
+  for (const HeldOutResult& image : report->images) EXPECT_EQ(image.error_m, 0);
+}
+
 TEST_F(FiguresTest, OfASparseMapCountWhatRetrievalFinds) {
   CheckMapReport sparse, full;
   sparse.images.resize(3);

@@ -100,7 +100,8 @@ TEST(PlanFit, TheRightPlanFits) {
 TEST(PlanFit, AMovedPlanIsNoticedAndTheMotionFound) {
   for (const auto& [turn_deg, shift] :
        {std::pair(0.0, Vec2(1, 0)), std::pair(0.0, Vec2(-0.6, 0.8)), std::pair(5.0, Vec2(0, 0)),
-        std::pair(-5.0, Vec2(0.5, 0.5)), std::pair(0.0, Vec2(0.3, 0)), std::pair(2.0, Vec2(0, 0))}) {
+        std::pair(-5.0, Vec2(0.5, 0.5)), std::pair(0.0, Vec2(0.3, 0)), std::pair(2.0, Vec2(0, 0)),
+        std::pair(6.0, Vec2(1.3, -1.4))}) {
     MapRows rows = SurveyOfRoom();
     rows.views = Moved(turn_deg, shift);
     const auto fit = FitPlan(rows, {});
@@ -136,6 +137,39 @@ TEST(PlanFit, TooLittleIsNoCheck) {
   rows.views = {};
   EXPECT_EQ(FitPlan(rows, {}).error().code, ErrorCode::kNoData);
   EXPECT_EQ(FitPlan(SurveyOfRoom(), {.plan_wall_distance_m = -1}).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(PlanFit, FiguresAndVerdictSayWhatWasFound) {
+  PlanFit fit{.num_landmarks = 200,
+              .num_on_walls = 50,
+              .median_wall_distance_m = 0.25,
+              .num_on_walls_moved = 180,
+              .center = {1, 2},
+              .shift = {3, -4},
+              .turn_deg = 1.5,
+              .num_images = 8,
+              .num_images_free = 6};
+  std::map<std::string, double> figures;
+  AddPlanFigures(fit, &figures);
+  EXPECT_EQ(figures, (std::map<std::string, double>{{"plan_num_landmarks", 200},
+                                                    {"plan_on_walls_ratio", 0.25},
+                                                    {"plan_on_walls_ratio_moved", 0.9},
+                                                    {"plan_median_wall_distance_m", 0.25},
+                                                    {"plan_shift_m", 5},
+                                                    {"plan_turn_deg", 1.5},
+                                                    {"plan_images_free_ratio", 0.75},
+                                                    {"plan_fits", 0}}));
+  EXPECT_EQ(PlanVerdict(fit),
+            "does not fit: 25 % of 200 landmarks lie on its walls, but 90 % if it were turned by 1.50 deg "
+            "about (1.00, 2.00), then shifted by (3.00, -4.00) m");
+  fit.turn_deg = 0;
+  EXPECT_THAT(PlanVerdict(fit), HasSubstr("turned by 0.00 deg"));
+  fit.shift = {0, 0};
+  EXPECT_EQ(PlanVerdict(fit), "does not fit, and no motion helps: 25 % of 200 landmarks lie on its walls");
+  fit.fits = true;
+  EXPECT_EQ(PlanVerdict(fit), "fits: 25 % of 200 landmarks lie on its walls");
+  AddPlanFigures({}, &figures);  // of nothing there are no parts
+  EXPECT_EQ(figures.at("plan_on_walls_ratio"), 0);
 }
 
 TEST(PlanGate, APlanThatDoesNotFitIsRefusedWhereAsked) {

@@ -84,11 +84,12 @@ TEST(AddPromiseFigures, CountsPromisesOfTheTermsProbability) {
   HeldOutResult unread = Image(At(0), std::nullopt);
   unread.rejected = "truncated";
   AddPromiseFigures(RowsWithPromise(),
-                    {Image(At(0), 0.05), Image(At(10), 0.2), Image(At(20), 0.05), Image(At(5), 0.05), unread},
+                    {Image(At(0), 0.05), Image(At(0), 0.06), Image(At(0), 0.07), Image(At(10), 0.2),
+                     Image(At(20), 0.05), Image(At(5), 0.05), unread},
                     &figures);
   EXPECT_THAT(figures,
-              UnorderedElementsAre(Pair("num_promised", 2), Pair("num_promised_kept", 1),
-                                   Pair("num_beyond_promises", 1), Pair("promised_kept_ratio", 0.5)));
+              UnorderedElementsAre(Pair("num_promised", 4), Pair("num_promised_kept", 3),
+                                   Pair("num_beyond_promises", 1), Pair("promised_kept_ratio", 0.75)));
   std::map<std::string, double> none;
   AddPromiseFigures(RowsWithPromise(), {}, &none);
   EXPECT_THAT(none, UnorderedElementsAre(Pair("num_promised", 0), Pair("num_promised_kept", 0),

@@ -77,6 +77,12 @@ TEST_F(ReportTest, BeginsWithWhatTheMapHas) {
   EXPECT_FALSE(json.contains("num_foreign"));
 }
 
+TEST_F(ReportTest, MayBeOfTheMapAlone) {
+  const PrintedReport map_alone{&rows_, 1234567, nullptr, nullptr, &options_};
+  EXPECT_THAT(ReportText(map_alone), testing::EndsWith("MB                     1.23\n"));
+  EXPECT_FALSE(nlohmann::json::parse(ReportJson(map_alone, true)).contains("images"));
+}
+
 TEST_F(ReportTest, HasTheFiguresOfHeldOutImagesInCentimetresAndPerCent) {
   held_out_.images = {FixOf("a.png", 0.9), FixOf("b.png", 0.995)};
   held_out_.figures = {{"num_localized", 2},

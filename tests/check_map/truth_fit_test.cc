@@ -64,7 +64,15 @@ TEST(FitTruth, NothingWhereASimilarityIsNotDetermined) {
   EXPECT_TRUE(FitTruth({fixes.begin(), fixes.begin() + 6}, false));
   EXPECT_FALSE(FitTruth({fixes.begin(), fixes.begin() + 5}, false));
   EXPECT_FALSE(FitTruth({}, true));
-  for (size_t i = 0; i < fixes.size(); ++i) {  // on a line
+  for (Pose FixAndTruth::*side : {&FixAndTruth::fix, &FixAndTruth::truth}) {  // one of them on a line
+    std::vector<FixAndTruth> half = fixes;
+    for (size_t i = 0; i < half.size(); ++i) {
+      Pose& pose = half[i].*side;
+      pose.translation = -(pose.rotation * Eigen::Vector3d(0.1 * static_cast<double>(i), 0, 0));
+    }
+    EXPECT_FALSE(FitTruth(half, false));
+  }
+  for (size_t i = 0; i < fixes.size(); ++i) {  // both
     fixes[i].fix.translation = -(fixes[i].fix.rotation * Eigen::Vector3d(0.1 * static_cast<double>(i), 0, 0));
     fixes[i].truth = fixes[i].fix;
   }
