@@ -2,17 +2,14 @@
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
-#include <CLI/CLI.hpp>
 
 #include "core/files/file.h"
 #include "core/world/dropped_items.h"
 #include "tests/decompose_regions/ascii_world.h"
+#include "tests/ran_command.h"
 
 namespace cairn::decompose_regions {
 namespace {
@@ -23,36 +20,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Pair;
 using testing::SizeIs;
-
-// What a command did: its results, what it logged, its report.
-struct Ran {
-  Status status = Ok();
-  std::string out, said;
-  StageReport report;
-};
-
-Ran RunWords(const Command& command, const std::vector<std::string>& words, int64_t memory_mib = 1 << 20) {
-  CLI::App app;
-  ArgumentParser parser(app);
-  command.add_arguments(parser);
-  app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-  Ran ran;
-  NoProgress progress;
-  std::ostringstream out, said;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(
-      std::make_shared<spdlog::logger>("said", std::make_shared<spdlog::sinks::ostream_sink_st>(said)));
-  ran.status = command.run({.num_threads = 1,
-                            .seed = 5,
-                            .memory_mib = memory_mib,
-                            .progress = &progress,
-                            .report = &ran.report,
-                            .out = &out});
-  spdlog::set_default_logger(before);
-  ran.out = out.str();
-  ran.said = said.str();
-  return ran;
-}
 
 class DecomposeRegionsCommandTest : public testing::Test {
  protected:
