@@ -28,7 +28,7 @@ struct Errors {
 //      .  . .    .  . .  .
 //        .  . .  .   .  .
 //       # # # # # # # # #      0.1 m apart
-struct Row {
+struct SurveyRow {
   Classes classes;
   MapRows rows;
 };
@@ -52,9 +52,9 @@ std::vector<std::optional<Keypoint>> See(const std::vector<Eigen::Vector3d>& poi
   return keypoints;
 }
 
-Row MakeRow(int num_images, int num_points, const Errors& errors, uint64_t seed) {
+SurveyRow MakeRow(int num_images, int num_points, const Errors& errors, uint64_t seed) {
   Random random(seed);
-  Row row;
+  SurveyRow row;
   row.rows.cameras = {{1, CameraModel::kSimplePinhole, 640, 480, {500, 320, 240}}};
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < num_points; ++i) {
@@ -86,7 +86,8 @@ Row MakeRow(int num_images, int num_points, const Errors& errors, uint64_t seed)
 
 // Which part of new images, placed by points that are exact, lies within the nine-of-ten bound of the
 // covariance.
-double PartWithinBound(const Row& row, const Errors& errors, const RefineOptions& options, uint64_t seed) {
+double PartWithinBound(const SurveyRow& row, const Errors& errors, const RefineOptions& options,
+                       uint64_t seed) {
   Random random(seed);
   std::vector<Eigen::Vector3d> points;
   for (const FeatureClass& feature : row.classes.classes) points.push_back(feature.position);
@@ -148,7 +149,7 @@ TEST(FitFixNoise, OneNumberOfInliersGivesAScaleAndLimitsHold) {
 }
 
 TEST(LearnFixNoise, IndependentKeypointsNeedNoWiderCovariance) {
-  const Row row = MakeRow(120, 900, {}, 1);
+  const SurveyRow row = MakeRow(120, 900, {}, 1);
   const auto noise = LearnFixNoise(row.classes, row.rows, 2);
   ASSERT_TRUE(noise);
   EXPECT_LT(noise->covariance_scale, 1.2);
@@ -156,7 +157,7 @@ TEST(LearnFixNoise, IndependentKeypointsNeedNoWiderCovariance) {
 }
 
 TEST(LearnFixNoise, LandmarksAreWhereTheOtherImagesPutThem) {
-  Row row = MakeRow(120, 900, {}, 1);
+  SurveyRow row = MakeRow(120, 900, {}, 1);
   for (FeatureClass& feature : row.classes.classes) feature.position += Eigen::Vector3d(0.02, -0.01, 0.03);
   const auto noise = LearnFixNoise(row.classes, row.rows, 2);
   ASSERT_TRUE(noise);
@@ -166,7 +167,7 @@ TEST(LearnFixNoise, LandmarksAreWhereTheOtherImagesPutThem) {
 
 TEST(LearnFixNoise, NineOfTenNewImagesLieWithinTheirBoundWhereKeypointsErrTogether) {
   const Errors errors{.own_px = 1, .shear_px = 1.5};
-  const Row row = MakeRow(240, 1500, errors, 2);
+  const SurveyRow row = MakeRow(240, 1500, errors, 2);
   const auto noise = LearnFixNoise(row.classes, row.rows, 2);
   ASSERT_TRUE(noise);
   EXPECT_LT(PartWithinBound(row, errors, {}, 3), 0.6);
@@ -183,7 +184,7 @@ TEST(LearnFixNoise, FewerKeypointsNeedLessWhereTheyErrTogether) {
 }
 
 TEST(LearnFixNoise, SameForAnyNumberOfThreads) {
-  const Row row = MakeRow(60, 600, {.own_px = 1, .shear_px = 1}, 4);
+  const SurveyRow row = MakeRow(60, 600, {.own_px = 1, .shear_px = 1}, 4);
   const auto one = LearnFixNoise(row.classes, row.rows, 1), three = LearnFixNoise(row.classes, row.rows, 3);
   ASSERT_TRUE(one && three);
   EXPECT_EQ(one->covariance_scale, three->covariance_scale);
@@ -191,10 +192,10 @@ TEST(LearnFixNoise, SameForAnyNumberOfThreads) {
 }
 
 TEST(LearnFixNoise, TwoRunsOrFewKeypointsSayNothing) {
-  const Row three_runs = MakeRow(36, 900, {}, 5), two_runs = MakeRow(24, 900, {}, 5);
+  const SurveyRow three_runs = MakeRow(36, 900, {}, 5), two_runs = MakeRow(24, 900, {}, 5);
   EXPECT_TRUE(LearnFixNoise(three_runs.classes, three_runs.rows, 1));
   EXPECT_FALSE(LearnFixNoise(two_runs.classes, two_runs.rows, 1));
-  const Row few_points = MakeRow(36, 60, {}, 5);
+  const SurveyRow few_points = MakeRow(36, 60, {}, 5);
   EXPECT_FALSE(LearnFixNoise(few_points.classes, few_points.rows, 1));
   EXPECT_FALSE(LearnFixNoise({}, {}, 1));
 }
