@@ -60,6 +60,12 @@ def is_at(change, place):
     return pathlib.Path(change.file).name == name and (not lines or int(first) <= change.line + 1 <= int(last or first))
 
 
+def functions_of(objects):
+    """The functions that objects define for others."""
+    said = subprocess.run(["nm", "--defined-only", *map(str, objects)], capture_output=True, text=True, check=True).stdout
+    return {line.split()[2] for line in said.splitlines() if line[17:19] == "T "}
+
+
 def commit_of(root):
     said = subprocess.run(["git", "-C", str(root), "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
     return said.stdout.strip() if said.returncode == 0 else "0"
@@ -175,6 +181,8 @@ class Room:
         self.changes = changes
         self.suites = []
         self.alone = set()
+        self.functions = set()
+        self.num_noticed = {}  # by file and suite
         shutil.copy(pathlib.Path(__file__).with_name("chosen.h"), folder)
         for source in texts:
             build.precompile(root / source, folder)
@@ -222,6 +230,7 @@ class Room:
             else:
                 raise SystemExit(f"{names[0]} and those beside it: the compiler still finds errors:\n{said[:2000]}")
             objects.append(to)
+        self.functions = functions_of(objects)
         return objects
 
     def refused(self, said, active, attempt):
@@ -264,7 +273,6 @@ class Room:
             if code:
                 return False
             suite.reached = file.read_bytes()
-        self.suites.sort(key=lambda suite: suite.time_s)
         return True
 
     def outcome(self, k, slot):
@@ -277,13 +285,17 @@ class Room:
             change = self.changes[k]
             changed, compiled = folder / pathlib.Path(change.file).name, folder / "changed.o"
             changed.write_text(change.applied(self.texts[change.file]))
-            if self.compile(change.file, changed, compiled)[0]:
+            # One that has another signature is another function: the tests would have that of the library.
+            if self.compile(change.file, changed, compiled)[0] or not functions_of([compiled]) <= self.functions:
                 return "broken"
         else:
             env["CAIRN_CHANGE"] = str(k)
             suites = [suite for suite in suites if suite.reached[k]]
             if not suites:
                 return "not reached"
+        # The quickest first, and those that noticed other changes of the file.
+        file = self.changes[k].file
+        suites = sorted(suites, key=lambda suite: (0.05 + suite.time_s) / (1 + 4 * self.num_noticed.get((file, id(suite)), 0)))
         try:
             for suite in suites:
                 program = suite.program
@@ -297,6 +309,7 @@ class Room:
                 if code == NO_SUCH_CHANGE:
                     return "broken"
                 if code:
+                    self.num_noticed[file, id(suite)] = self.num_noticed.get((file, id(suite)), 0) + 1
                     return "noticed"
             return "survived"
         finally:

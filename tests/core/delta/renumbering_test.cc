@@ -58,7 +58,10 @@ TEST(Renumbered, NamesElementsByTheirNewNumbers) {
   EXPECT_EQ(rows.images[2].station, -1) << "its station is not in the other map";
   EXPECT_THAT(rows.images[2].landmarks, ElementsAre(1, 3));
   EXPECT_THAT(rows.images[3].landmarks, ElementsAre(3, 4));
+  ASSERT_EQ(rows.stations.size(), 3U);
+  EXPECT_EQ(rows.stations[0].position, Eigen::Vector2d::Zero()) << "new";
   EXPECT_EQ(rows.stations[1].position, from.stations[0].position);
+  EXPECT_EQ(rows.stations[2].position, from.stations[2].position);
   EXPECT_THAT(rows.station_edges, ElementsAre(std::pair(1, 2)));
   ASSERT_EQ(rows.regions.size(), 2U);
   EXPECT_THAT(rows.regions[0].stations, ElementsAre(1));
@@ -73,6 +76,20 @@ TEST(Renumbered, NamesElementsByTheirNewNumbers) {
   EXPECT_THAT(rows.appearance[0].look_alikes, ElementsAre(MapAppearanceNode::LookAlike{2, 0.5}));
   EXPECT_EQ(rows.appearance[1], (MapAppearanceNode{.entropy = 0})) << "new";
   EXPECT_THAT(rows.appearance[2].images, ElementsAre(2, 3));
+}
+
+TEST(Renumbered, UnderItsOwnNumbersAMapStaysAsItIs) {
+  const MapRows from = SmallRows(), rows = Renumbered(from, FindSame(from, from));
+  for (size_t i = 0; i < from.stations.size(); ++i) {
+    EXPECT_EQ(rows.stations[i].position, from.stations[i].position);
+    EXPECT_EQ(rows.stations[i].heading_deg, from.stations[i].heading_deg);
+  }
+  for (size_t i = 0; i < from.images.size(); ++i) {
+    EXPECT_EQ(rows.images[i].station, from.images[i].station);
+    EXPECT_EQ(rows.images[i].landmarks, from.images[i].landmarks);
+  }
+  EXPECT_EQ(rows.station_edges, from.station_edges);
+  EXPECT_EQ(rows.appearance, from.appearance);
 }
 
 TEST(Renumbered, LinksStandAtTheSmallerNodeWhateverTheOrder) {
@@ -137,6 +154,7 @@ TEST(ReadRenumbering, RefusesWhatIsNotThere) {
   EXPECT_FALSE(reads(bytes({2, 2, 0, 2, 1})));  // 0 twice
   EXPECT_FALSE(reads(bytes({1, 0, 0})));        // an empty run
   EXPECT_FALSE(reads(bytes({1, 3 + 2})));       // two new ones of one
+  EXPECT_FALSE(reads(bytes({3, 5, 5})));        // two more of three
   EXPECT_FALSE(reads(bytes({5, 10})));          // cut off
   EXPECT_FALSE(reads(bytes({1, 2, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1})));
 }

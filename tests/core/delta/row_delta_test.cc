@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/delta/map_delta.h"
+#include "core/delta/renumbering.h"
 #include "core/files/file.h"
 #include "tests/core/delta/two_maps.h"
 #include "tests/core/map/packed_rows.h"
@@ -101,6 +102,8 @@ TEST_F(PackedMaps, TheSameMapNeedsNoRows) {
   const MapDelta delta = Delta();
   EXPECT_FALSE(delta.has_rows);
   EXPECT_LT(delta.payload.size(), 100U);
+  const std::string bytes = *ReadFile(Path("old"));
+  EXPECT_EQ(ApplyMapDelta(delta, bytes, Path("old"), "delta").value(), bytes);
 }
 
 TEST_F(PackedMaps, DeltasOfALaterFormatAreRefused) {
@@ -163,6 +166,78 @@ TEST(RowDelta, RefusesMoreThanItMayTake) {
   }
   for (size_t length = 0; length < delta.size(); ++length)
     EXPECT_FALSE(ApplyRowDelta(from, delta.substr(0, length), kMuch, "delta").ok()) << length;
+}
+
+// A delta that leads to the map itself, up to where its code of descriptors is said.
+BlobWriter HeadOf(const MapRows& rows, uint64_t num_regions) {
+  BlobWriter writer;
+  WriteRenumbering(FindSame(rows, rows), &writer);
+  writer.Varint(num_regions);
+  return writer;
+}
+
+TEST(RowDelta, IsOfSiftDescriptorsAlone) {
+  const MapRows rows = Coded(SmallRows());
+  MapRows learned = rows;
+  learned.descriptor_kind = {DescriptorType::kFloat, kSiftDescriptorDim, ""};
+  EXPECT_EQ(MakeRowDelta(learned, learned, "map").value(), std::nullopt);
+  EXPECT_EQ(ApplyRowDelta(learned, Made(rows, rows), kMuch, "delta").error().message,
+            "delta: its landmarks make no sense");
+}
+
+TEST(RowDelta, RefusesMoreRegionsThanItMayTake) {
+  const MapRows rows = Coded(SmallRows());
+  const auto refused = [&](uint64_t num_regions) {
+    return ApplyRowDelta(rows, HeadOf(rows, num_regions).Take(), 100 * sizeof(MapRegion), "delta")
+        .error()
+        .message;
+  };
+  EXPECT_EQ(refused(101), "delta: its regions make no sense");
+  EXPECT_EQ(refused(100), "delta: its landmarks make no sense") << "which are not there any more";
+}
+
+TEST(RowDelta, ACodeIsTheFirstMapsOrItsOwnAndHasAStep) {
+  const MapRows rows = Coded(SmallRows());
+  const std::string good = Made(rows, rows);
+  const size_t place = HeadOf(rows, rows.regions.size()).Take().size();
+  ASSERT_EQ(good[place], 0);
+  std::string bad = good;
+  bad[place] = 2;
+  EXPECT_EQ(ApplyRowDelta(rows, bad, kMuch, "delta").error().message, "delta: its landmarks make no sense");
+  MapRows plain = rows;
+  plain.descriptor_code.reset();
+  EXPECT_EQ(ApplyRowDelta(plain, good, kMuch, "delta").error().message, "delta: its landmarks make no sense");
+  const auto own_code = [&](uint8_t step) {
+    std::string own = good;
+    own[place] = 1;
+    return own.insert(place + 1, static_cast<char>(step) + std::string(kSiftDescriptorDim, 5));
+  };
+  EXPECT_TRUE(ApplyRowDelta(rows, own_code(1), kMuch, "delta").ok());
+  EXPECT_EQ(ApplyRowDelta(rows, own_code(0), kMuch, "delta").error().message,
+            "delta: its landmarks make no sense");
+}
+
+TEST(RowDelta, RefusesMoreInListsThanItMayTake) {
+  MapRows from = SmallRows();
+  for (int i = 5; i < 60; ++i) {
+    from.landmarks.push_back(from.landmarks[0]);
+    from.landmarks.back().class_id = 100 + i;
+  }
+  from.descriptors = DescriptorMatrix::Constant(60, kSiftDescriptorDim, 7);
+  from = Coded(from);
+  MapRows to = from;
+  MapRegion region{.stations = {0, 1, 2}, .landmarks = {}};
+  for (int i = 0; i < 60; ++i) region.landmarks.push_back(i);
+  to.regions.resize(130, region);
+  // Lists as they will be, and how they differ: images 9 and 0, the first two regions 10 and 0, 128 of 63 and
+  // as many.
+  const int64_t num_bytes = 4 * (9 + 10 + 128 * (63 + 63));
+  const std::string delta = Made(from, to);
+  const Result<MapRows> made = ApplyRowDelta(from, delta, num_bytes, "delta");
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  EXPECT_EQ(EncodedBlocks(*made), EncodedBlocks(to));
+  EXPECT_EQ(ApplyRowDelta(from, delta, num_bytes - 4, "delta").error().message,
+            "delta: its lists make no sense");
 }
 
 }  // namespace

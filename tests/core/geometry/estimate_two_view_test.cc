@@ -124,6 +124,11 @@ TEST(EstimateTwoView, EightPointsAreEstimatedFromAllThatAgree) {
   const SeenByTwo seen = SeePoints(600, 1e-3, 100);
   const Eigen::Matrix3d E = EssentialMatrix(seen.cam2_from_cam1);
   EXPECT_LT(Differ(*EstimateByEightPoints(seen.correspondences, true, kThreeThousandths), E), 0.05);
+  // Of what agrees with a single sample, too.
+  EXPECT_LT(Differ(*EstimateByEightPoints(SeePoints(300, 1e-3).correspondences, true,
+                                          {.max_error_rad = 0.01, .max_num_iterations = 1}),
+                   E),
+            0.05);
   // Of one sample, too, where it is free of outliers.
   const EstimateModelOptions one_sample = {.max_error_rad = 0.003, .max_num_iterations = 1};
   EXPECT_TRUE(EstimateByEightPoints(SeePoints(30, 1e-4).correspondences, true, one_sample));
@@ -161,6 +166,9 @@ TEST(EstimateTwoView, AHomographyTakesBearingsToTheFront) {
   for (int i = 0; i < 40; ++i) behind.Add(turned.bearings1[i], turned.bearings2[i], i);
   for (int i = 0; i < 60; ++i) behind.Add(turned.bearings1[i % 40], -turned.bearings2[i % 40], i);
   EXPECT_LT((*EstimateHomography(behind, kThreeThousandths) + turn / turn.norm()).norm(), 1e-4);
+  // And with most in front again.
+  for (int i = 0; i < 30; ++i) behind.Add(turned.bearings1[i], turned.bearings2[i], i);
+  EXPECT_LT((*EstimateHomography(behind, kThreeThousandths) - turn / turn.norm()).norm(), 1e-4);
 }
 
 TEST(PosesFromHomography, TheTruePoseIsAmongThem) {

@@ -31,7 +31,7 @@ TEST(Geodesy, InverseIsExactOnAllHemispheresAndAtThePoles) {
       for (const double altitude : {-400.0, 0.0, 8848.0, 90000.0}) {
         const GeodeticPosition position{latitude, longitude, altitude};
         const GeodeticPosition again = GeodeticFromEcef(EcefFromGeodetic(position));
-        EXPECT_NEAR(again.latitude_deg, latitude, 1e-9);
+        EXPECT_NEAR(again.latitude_deg, latitude, 1e-10);
         EXPECT_NEAR(again.altitude_m, altitude, 1e-4);
         if (latitude > -90) {
           EXPECT_NEAR(again.longitude_deg, longitude, 1e-9);

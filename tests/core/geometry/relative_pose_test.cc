@@ -54,6 +54,22 @@ TEST(RefineRelativePose, FindsThePoseFromNearby) {
   EXPECT_NEAR(refined.translation.norm(), 1, 1e-12);
 }
 
+TEST(RefineRelativePose, FindsItOfBearingsAllAround) {
+  Random random(9);
+  const auto vector = [&] {
+    const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
+    return Eigen::Vector3d(x, y, random.Uniform(-1, 1));
+  };
+  Pose truth = SeePoints(1, 0).cam2_from_cam1;
+  Correspondences c;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d point = 4 * vector();
+    c.Add(point.normalized(), (truth * point).normalized(), i);
+  }
+  const Pose start = Turned(truth, {0.02, -0.03, 0.01}, {0.05, 0.02, -0.04});
+  EXPECT_LT(OffBy(RefineRelativePose(start, c, 0.1, 4), truth), 1e-5);
+}
+
 TEST(RefineRelativePose, ItsCostIsLeast) {
   const SeenByTwo seen = SeePoints(200, 5e-4, 30);
   for (const double scale_rad : {5e-4, 0.001}) {
@@ -124,6 +140,23 @@ TEST(PoseFromEssentialMatrix, PutsMostPointsInFrontOfBothCameras) {
       EXPECT_LT(OffBy(pose, truth), 1e-6) << trial << " " << scale;
       EXPECT_NEAR(pose.translation.norm(), 1, 1e-12);
     }
+  }
+}
+
+TEST(PoseFromEssentialMatrix, OnePointTellsTheFourPosesApart) {
+  Random random(8);
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto vector = [&] {
+      const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
+      return Eigen::Vector3d(x, y, random.Uniform(-1, 1));
+    };
+    Pose truth;
+    truth.rotation = Eigen::AngleAxisd(random.Uniform(0, 3), vector().normalized());
+    truth.translation = vector().normalized();
+    const Eigen::Vector3d point = 4 * vector();
+    Correspondences c;
+    c.Add(point.normalized(), (truth * point).normalized(), 0);
+    EXPECT_LT(OffBy(PoseFromEssentialMatrix(EssentialMatrix(truth), c), truth), 1e-6) << trial;
   }
 }
 
