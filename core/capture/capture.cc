@@ -16,6 +16,7 @@
 #include "core/colmap/cut_database.h"
 #include "core/colmap/image_list.h"
 #include "core/files/file.h"
+#include "core/files/input_file.h"
 #include "core/images/image_file.h"
 
 namespace cairn {
@@ -505,6 +506,10 @@ Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::v
       rejects->push_back(
           {image.name, fmt::format("{}:{}: the image's name has a control character; rename it", path,
                                    listed.line_number)});
+    } else if (!IsPathBelow(image.name)) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: the image's name leads out of the folder of images; move it there",
+                                   path, listed.line_number)});
     } else {
       images.push_back({std::move(image.name), image.camera_id, image.cam_from_world});
     }

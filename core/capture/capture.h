@@ -92,7 +92,7 @@ std::string SessionPosesPath(const std::string& root, const std::string& session
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
 // may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;
-// smaller differences are normalised away.  Names with a control character go to `rejects` too.
+// smaller differences are normalised away.  Names with a control character, or that lead out, go there too.
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects);
 // REQUIRES: every image has a pose.  Ids are 1, 2, ... in the given order.  Errors: InvalidArgument (a name
 // with a control character: CheckListedName), Io.

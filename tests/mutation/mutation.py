@@ -38,6 +38,7 @@ MEMORY_BYTES = 8 << 30
 FILE_BYTES = 1 << 30
 COMPILE_LIMIT_S = 1200
 NO_SUCH_CHANGE = 97  # chosen.h
+MAX_ATTEMPTS = 12  # to compile all that the compiler takes together
 # A share of the changes is too few where the room's figure would give so few, or fewer, with less than this probability.
 SIGNIFICANCE = 0.01
 
@@ -58,6 +59,11 @@ def is_at(change, place):
     name, _, lines = place.partition(":")
     first, _, last = lines.partition("-")
     return pathlib.Path(change.file).name == name and (not lines or int(first) <= change.line + 1 <= int(last or first))
+
+
+def give_up(message):
+    print(message, file=sys.stderr)
+    raise SystemExit(2)
 
 
 def functions_of(objects):
@@ -207,7 +213,7 @@ class Room:
             names = [str(source.relative_to(self.root)) for source in group]
             to, joined = self.folder / f"schema_{number}.o", self.folder / f"schema_{number}.cc"
             active = {k: change for k, change in self.changes.items() if change.file in names}
-            for attempt in range(12):
+            for attempt in range(MAX_ATTEMPTS):
                 parts = [f'#include "{self.folder / "chosen.h"}"\n']
                 for name in names:
                     schema, lacking = schema_of(self.texts[name], {k: change for k, change in active.items() if change.file == name})
@@ -221,41 +227,34 @@ class Room:
                     code, said = self.compile(names[0], joined, to)
                     if code == 0:
                         break
-                refused = self.refused(said, active, attempt)
-                if not refused:
-                    raise SystemExit(f"{names[0]} and those beside it cannot be compiled together:\n{said[:2000]}")
+                refused = self.refused(said, active)
+                if not refused or attempt == MAX_ATTEMPTS - 1:
+                    give_up(f"{names[0]} and those beside it cannot be compiled together:\n{said[:2000]}")
                 self.alone |= refused
                 for k in refused:
                     active.pop(k)
-            else:
-                raise SystemExit(f"{names[0]} and those beside it: the compiler still finds errors:\n{said[:2000]}")
             objects.append(to)
         self.functions = functions_of(objects)
         return objects
 
-    def refused(self, said, active, attempt):
-        """The changes of lines with errors; where none is on such a line, of all that the compiler speaks of, and near them."""
-        places = re.findall(r"^(/[^:\n]*):(\d+):\d+: +(\w+)", said, re.MULTILINE)
-        for near, kinds in ((0, ("error", "fatal")), (0, ("error", "note", "required")), (3, ("error", "note", "required"))):
-            lines = {(str(self.root / change.file), change.line + 1 + d): set() for change in active.values() for d in range(-near, near + 1)}
-            for k, change in active.items():
-                for d in range(-near, near + 1):
-                    lines[str(self.root / change.file), change.line + 1 + d].add(k)
-            found = set()
-            for file, line, kind in places:
-                if kind in kinds or near:
-                    found |= lines.get((file, int(line)), set())
+    def refused(self, said, active):
+        """The changes of lines with errors; where none is on such a line, of all that the compiler speaks of, and then near them."""
+        places = {(file, int(line), kind) for file, line, kind in re.findall(r"^(/[^:\n]*):(\d+):\d+: +(\w+)", said, re.MULTILINE)}
+        errors, all_kinds = ("error", "fatal"), {kind for _, _, kind in places}
+        for kinds, near in ((errors, 0), (all_kinds, 0), (all_kinds, 3)):
+            found = {k for k, change in active.items() for file, line, kind in places
+                     if kind in kinds and file == str(self.root / change.file) and abs(line - 1 - change.line) <= near}
             if found:
                 return found
-        return set(active) if attempt < 11 and active else set()
+        return set(active)
 
     def find_suites(self, objects):
         """Links and runs all tests once; False where some fail, as they are."""
-        for place, test in enumerate(self.tests):
+        for test in self.tests:
             name, *options = test.split()
             program = next((suite.program for suite in self.suites if suite.program.name.endswith(f"_all_{name}")), None) or self.program(name, objects, "all")
             if program is None:
-                raise SystemExit(f"{name}: cannot be linked with the changed sources")
+                give_up(f"{name}: cannot be linked with the changed sources")
             listed = subprocess.run([str(program), *options, "--gtest_list_tests"], cwd=self.build.folder, capture_output=True, text=True, check=False,
                                     env={**os.environ, "TEST_TMPDIR": str(self.folder)})
             suites = {}

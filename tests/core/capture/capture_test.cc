@@ -308,6 +308,19 @@ TEST_F(CaptureTest, NamesWithControlCharactersAreRejectedFromListsAndNotWritten)
   EXPECT_FALSE(fs::exists(root_ + "/out.txt"));
 }
 
+TEST_F(CaptureTest, NamesThatLeadOutOfTheFolderOfImagesAreRejected) {
+  AddFiles({"a.jpg", "deep/b.jpg"});
+  Write("beside.jpg", kWide);
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 ../beside.jpg\n\n3 1 0 0 0 0 0 0 1 " +
+                          root_ + "/images/a.jpg\n\n4 1 0 0 0 0 0 0 1 deep/b.jpg\n\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_EQ(capture->images.size(), 2u);
+  ASSERT_EQ(capture->rejects.size(), 2u);
+  for (const Reject& reject : capture->rejects)
+    EXPECT_THAT(reject.reason, HasSubstr("the image's name leads out of the folder of images"));
+}
+
 TEST_F(CaptureWithoutPoses, ListsThatOnlyPosesGiveAMeaningAreNotReadSilently) {
   Write("cameras.txt", "1 PINHOLE 3 2 9 8 1.5 1\n");
   Write("frame.json", "{}");
