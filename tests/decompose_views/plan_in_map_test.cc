@@ -69,6 +69,22 @@ TEST(PlanInMap, StoredRegionsAreThoseThatAreGiven) {
   EXPECT_EQ(Regions(*map)->get(), map->Plan()->get());
 }
 
+TEST(PlanInMap, DerivedRegionsAreCountedAsWhatTheyTake) {
+  const auto map = MapWith(decompose_views::Decomposed(kFlat).views, /*regions=*/false);
+  ASSERT_TRUE(map->Plan().ok());
+  const int64_t before = map->num_kept_bytes();
+  const auto found = *Regions(*map);
+  const auto list = [](const auto& values) {
+    return static_cast<int64_t>(values.size() * sizeof(values.front()));
+  };
+  const int64_t taken = list(found->vertices) + list(found->face_offsets) + list(found->face_vertices) +
+                        list(found->parents) + list(found->toggle_offsets) + list(found->toggled_labels) +
+                        list(found->index) + list(found->links) + list(found->plan.vertices) +
+                        list(found->plan.pieces) + list(found->plan.walls);
+  EXPECT_GT(map->num_kept_bytes() - before, taken);
+  EXPECT_LT(map->num_kept_bytes() - before, taken + 2000);  // and the structs themselves
+}
+
 TEST(PlanInMap, AMapWithoutAPlanSaysSo) {
   MapRows rows = FullRows();
   rows.views = {};

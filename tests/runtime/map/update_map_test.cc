@@ -219,6 +219,16 @@ TEST_F(UpdateMapTest, DamagedPreviousMapIsNotRolledBackTo) {
   EXPECT_EQ(*ReadFile(map), *ReadFile(Path("new.cairn")));
 }
 
+TEST_F(UpdateMapTest, WithoutAMapInPlaceThereIsNothingToExchange) {
+  const std::string map = Copy("old.cairn", "robot.cairn");
+  ASSERT_TRUE(UpdateMap(map, WriteDelta("delta")).ok());
+  fs::remove(map);
+  const Error error = RollBackMap(map).error();
+  EXPECT_EQ(error.code, ErrorCode::kNotFound);
+  EXPECT_EQ(error.message, map + ": no such file");
+  EXPECT_EQ(*ReadFile(PreviousMapPath(map)), *ReadFile(Path("old.cairn")));
+}
+
 // Two at once would both keep what the first one made as the map before.
 TEST_F(UpdateMapTest, OneUpdateAtATime) {
   const std::string map = Copy("old.cairn", "robot.cairn"), delta = WriteDelta("delta");
@@ -301,6 +311,15 @@ TEST_F(UpdateMapTest, NothingBesideTheMapAndThePreviousOneStays) {
   fs::create_directories(PreviousMapPath(map));
   EXPECT_EQ(UpdateMap(map, delta).error().code, ErrorCode::kIo);
   EXPECT_THAT(names(), testing::ElementsAre("robot.cairn", "robot.cairn.previous"));
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
+}
+
+// Nor is anything else that is no file, when the update stops because of it.
+TEST_F(UpdateMapTest, WhatIsInThePlaceOfThePreviousMapStays) {
+  const std::string map = Copy("old.cairn", "robot.cairn"), delta = WriteDelta("delta");
+  ASSERT_EQ(mkfifo(PreviousMapPath(map).c_str(), 0600), 0);
+  EXPECT_EQ(UpdateMap(map, delta).error().code, ErrorCode::kIo);
+  EXPECT_TRUE(fs::is_fifo(PreviousMapPath(map)));
   EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
 }
 

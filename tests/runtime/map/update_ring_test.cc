@@ -136,11 +136,19 @@ TEST_F(UpdateRing, SignaturesOfStrangersAreInNobodysWay) {
   Send(2);
   SignatureList many = ReadSignatures(Path("ring.delta.signatures")).value();
   const Seal seal = ReadSeal(Path("ring.2")).value();
-  while (many.size() < kMaxSignatures) {
-    const KeyPair key = MakeKeyPair();
-    many.push_back({key.public_key, *SignBytes(SignedBytesOf(seal), key.secret_key)});
-  }
-  ASSERT_TRUE(WriteFileAtomically(Path("ring.delta.signatures"), EncodeSignatures(many)).ok());
+  const auto send_with_strangers = [&](size_t num) {
+    while (many.size() < num) {
+      const KeyPair key = MakeKeyPair();
+      many.push_back({key.public_key, *SignBytes(SignedBytesOf(seal), key.secret_key)});
+    }
+    ASSERT_TRUE(WriteFileAtomically(Path("ring.delta.signatures"), EncodeSignatures(many)).ok());
+  };
+  // With Bob's of the first epoch, as many as there may be: all stay.
+  send_with_strangers(kMaxSignatures - 1);
+  EXPECT_EQ(Update(Path("ring.delta")), ErrorCode{}) << message_;
+  EXPECT_EQ(ReadSignatures(SignaturesPath(robot_)).value().size(), kMaxSignatures);
+  Install(1, {1});
+  send_with_strangers(kMaxSignatures);
   EXPECT_EQ(Update(Path("ring.delta")), ErrorCode{})
       << message_;  // with Bob's of the first epoch, one too many
   EXPECT_EQ(SignaturesInPlace(), Bobs({1, 2}));
