@@ -37,7 +37,7 @@ void LogBudget::Advance(double max_bytes_per_day, const MachineClocks& now) {
   const bool is_same_start = now.boot_id == boot_id && now.boot_s >= boot_s;
   const double elapsed_s = is_same_start ? now.boot_s - boot_s : std::max(0.0, now.wall_s - latest_wall_s);
   const double most = MostBytes(max_bytes_per_day);
-  bytes = std::clamp(bytes + most * std::min(1.0, elapsed_s / kSecondsADay), 0.0, most);
+  bytes = std::clamp(bytes + most * elapsed_s / kSecondsADay, 0.0, most);
   lived_s += elapsed_s;
   latest_wall_s = std::max(latest_wall_s, now.wall_s);
   boot_s = now.boot_s;
