@@ -122,8 +122,8 @@ std::vector<MapScore> CodeIndex::Rank(const Features& features) const {
                    .score = EvidenceOf(best.sum, by_chance) - std::log(static_cast<double>(best.num_places))};
     for (const auto& [entry, each] : shown) {
       const auto place = static_cast<size_t>(entries_[entry].place);
-      if (place == best.place || (is_followed(best.place) && place == best.place + 1))
-        score.features.push_back(each.feature);
+      const bool is_best = place == best.place || (is_followed(best.place) && place == best.place + 1);
+      if (best.sum > 0 && is_best) score.features.push_back(each.feature);
     }
     std::sort(score.features.begin(), score.features.end());
     score.features.erase(std::unique(score.features.begin(), score.features.end()), score.features.end());

@@ -59,12 +59,17 @@ TEST_F(AtlasLocalizerTest, FindsTheRoomAndThePlace) {
 TEST_F(AtlasLocalizerTest, AnImageOfAnotherBuildingIsOfNoMap) {
   const auto atlas = Open(Rows());
   const SyntheticRoom other = MakeUnmappedRoom(99, 1600);
-  Random random(2);
+  Random random(2), again(2);
   for (int i = 0; i < 20; ++i) {
     const AtlasAnswer answer = Answer(atlas, RenderFeatures(other, RandomPose(random), {}, i), other.camera);
     EXPECT_THAT(answer.hypotheses, IsEmpty());
     EXPECT_EQ(answer.elsewhere, 1);
     EXPECT_FALSE(answer.best_failure.has_fix());
+    ASSERT_FALSE(answer.maps_tried.empty());
+    Localizer first(*atlas->OpenMap(answer.maps_tried[0]));
+    const Localization alone =
+        *first.LocalizeFeatures(RenderFeatures(other, RandomPose(again), {}, i), other.camera);
+    EXPECT_EQ(answer.best_failure.message, alone.message) << "of the map with most evidence";
   }
 }
 
@@ -99,6 +104,8 @@ TEST_F(AtlasLocalizerTest, TwoFloorsThatLookAlikeShareTheProbability) {
     EXPECT_NEAR(answer.hypotheses[0].probability, 0.5, 0.01);
     EXPECT_NEAR(answer.hypotheses[1].probability, 0.5, 0.01);
     EXPECT_NE(answer.hypotheses[0].map, answer.hypotheses[1].map);
+    if (answer.hypotheses[0].probability == answer.hypotheses[1].probability)
+      EXPECT_EQ(answer.hypotheses[0].map, answer.maps_tried[0]);
   }
 }
 
@@ -119,6 +126,9 @@ TEST_F(AtlasLocalizerTest, AKnownLookAlikeIsAskedHoweverLittleItsCodesAgree) {
   const AtlasAnswer aware = Answer(atlas, seen, Room(1).camera);
   ASSERT_THAT(aware.hypotheses, SizeIs(2));
   EXPECT_THAT(aware.maps_tried, ElementsAre(1, 3));
+  const AtlasAnswer unsure =
+      Answer(atlas, seen, Room(1).camera, {.max_num_maps = 10, .sure_probability = 1, .rival_ratio = 1});
+  EXPECT_THAT(unsure.maps_tried, testing::UnorderedElementsAre(0, 1, 2, 3)) << "each once";
   EXPECT_NEAR(aware.hypotheses[0].probability, 0.5, 0.01);
   // Both ways.
   EXPECT_THAT(atlas->MapsLike(1, 7), ElementsAre(3));
@@ -167,9 +177,12 @@ TEST_F(AtlasLocalizerTest, WithoutACameraEachMapHasItsOwn) {
   ASSERT_TRUE(wrong_size.ok()) << wrong_size.error().message;
   EXPECT_THAT(wrong_size->maps_tried, IsEmpty());
   EXPECT_THAT(wrong_size->best_failure.message, HasSubstr("100 x 100"));
-  const auto wrong_camera = localizer.Localize(cv::Mat::zeros(10, 10, CV_8U), Room(0).camera);
-  ASSERT_FALSE(wrong_camera.ok());
-  EXPECT_EQ(wrong_camera.error().code, ErrorCode::kInvalidArgument);
+  for (const auto& [width, height] : {std::pair(640, 10), {10, 480}, {10, 10}}) {
+    const auto wrong_camera = localizer.Localize(cv::Mat::zeros(height, width, CV_8U), Room(0).camera);
+    ASSERT_FALSE(wrong_camera.ok());
+    EXPECT_EQ(wrong_camera.error().code, ErrorCode::kInvalidArgument);
+  }
+  EXPECT_THAT(localizer.Localize(cv::Mat::zeros(480, 640, CV_8U), Room(0).camera)->hypotheses, IsEmpty());
 }
 
 TEST_F(AtlasLocalizerTest, AnotherFileThanTheAtlasWasMadeOfIsRefused) {
@@ -223,9 +236,11 @@ TEST_F(AtlasLocalizerTest, IsTheAtlasThatWasAskedFor) {
   EXPECT_EQ(code({.name = "halls"}), ErrorCode::kOtherMap);
   EXPECT_EQ(code({.min_epoch = 4}), ErrorCode::kNotNewer);
   EXPECT_EQ(code({.max_num_open_maps = 0}), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code({.max_num_open_maps = 1}), std::nullopt);
   EXPECT_EQ(code({.memory_budget_bytes = 0}), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code({.public_key = MakeKeyPair().public_key}), ErrorCode::kNotSigned);
   const auto atlas = *Atlas::Open(Path("of.atlas"));
+  EXPECT_EQ(*atlas->FindMap("room 0"), 0);
   EXPECT_EQ(*atlas->FindMap("room 2"), 2);
   EXPECT_EQ(atlas->FindMap("room 3").error().code, ErrorCode::kNotFound);
 }

@@ -97,5 +97,16 @@ TEST_F(AtlasRouteTest, ImagesAreNamedByTheirMaps) {
   EXPECT_EQ(FindImage(*atlas, "survey7").error().code, ErrorCode::kNotFound);
 }
 
+// Names of maps may be the beginnings of others: the longest counts, wherever it stands.
+TEST_F(AtlasRouteTest, ImagesAreOfTheMapWithTheLongestName) {
+  AtlasRows rows;
+  for (const char* name : {"hall/east", "hall", "hall/east/up"}) rows.maps.push_back({.name = name});
+  EXPECT_EQ(MapOfImage(rows, "hall/east/7.jpg").value(), 0);
+  EXPECT_EQ(MapOfImage(rows, "hall/7.jpg").value(), 1);
+  EXPECT_EQ(MapOfImage(rows, "hall/east/up/7.jpg").value(), 2);
+  EXPECT_EQ(MapOfImage(rows, "hall/eastern/7.jpg").value(), 1);
+  EXPECT_FALSE(MapOfImage(rows, "hallway/7.jpg").ok());
+}
+
 }  // namespace
 }  // namespace cairn
