@@ -77,5 +77,13 @@ TEST(PlanRays, MeetNothingInAPlanWithoutWallsOrAlongOne) {
   EXPECT_EQ(rays.Cast({3.5, 0}, {1, 0}, 100).size, 0);
 }
 
+TEST(PlanRays, OfWallsAtOnePlaceTheFirstOnesAreKept) {
+  const std::vector<PlanWall> walls(PlanRays::kMaxHits + 2, PlanWall{{2, -1}, {2, 1}});
+  const PlanRays rays(walls);
+  const PlanRays::Hits hits = rays.Cast({0, 0}, {1, 0}, 10);
+  ASSERT_EQ(hits.size, PlanRays::kMaxHits);
+  for (int k = 0; k < hits.size; ++k) EXPECT_EQ(hits.at[k].wall, k);
+}
+
 }  // namespace
 }  // namespace cairn

@@ -134,5 +134,46 @@ TEST(SearchPoses, EndsWhereItMust) {
   EXPECT_TRUE(cut.poses.empty());
 }
 
+// Ends in a row along y, `step_m` apart, and to and fro by `off_m` across it.
+std::vector<Beam> Zigzag(int num, double step_m, double off_m) {
+  std::vector<Beam> beams;
+  for (int i = 0; i < num; ++i) {
+    const Vec2 end(2 + (i % 2 == 0 ? off_m : -off_m), step_m * i);
+    beams.push_back({end.normalized(), end.norm(), true});
+  }
+  return beams;
+}
+
+TEST(EndsApart, HaveADirectionWhereNeighboursAreNarrowEnough) {
+  const auto has_direction = [](const std::vector<Beam>& beams, size_t i) {
+    return EndsApart(beams, 0.001).at(i).along_rad.has_value();
+  };
+  // Of 13 ends within 0.3 m either way: 0.19 m along and 0.15 of that, 2.8 cm, across.
+  EXPECT_TRUE(has_direction(Zigzag(21, 0.05, 0.024), 10));
+  EXPECT_FALSE(has_direction(Zigzag(21, 0.05, 0.033), 10));
+  // Three are enough, two are not; nor are those that are farther off or that follow one that met nothing.
+  EXPECT_TRUE(has_direction(Zigzag(3, 0.1, 0), 1));
+  EXPECT_TRUE(has_direction(Zigzag(3, 0.1, 0), 0));
+  EXPECT_FALSE(has_direction(Zigzag(2, 0.1, 0), 0));
+  EXPECT_TRUE(has_direction(Zigzag(3, 0.29, 0), 1));
+  EXPECT_FALSE(has_direction(Zigzag(3, 0.31, 0), 1));
+  std::vector<Beam> interrupted = Zigzag(4, 0.1, 0);
+  interrupted[2].met = false;
+  EXPECT_FALSE(has_direction(interrupted, 1));
+  // Nearer than 2.5 cm to each other they are one.
+  EXPECT_FALSE(has_direction(Zigzag(4, 0.012, 0), 0));
+  EXPECT_FALSE(has_direction(Zigzag(4, 0.013, 0), 0));
+  EXPECT_TRUE(has_direction(Zigzag(5, 0.013, 0), 0));
+}
+
+TEST(SearchPoses, HeadingsBeginAtNone) {
+  const std::vector<PlanWall> walls = OddRoom();
+  const WallField field(walls);
+  Random random(3);
+  const PlanarPose pose{field.grid().Middle(50, 45), 0};
+  const auto ends = EndsApart(BeamsAt(walls, pose, 0, &random), 0.15);
+  EXPECT_EQ(SearchPoses(field, ends, {.step_deg = 15}).poses.at(0).pose.heading_rad, 0);
+}
+
 }  // namespace
 }  // namespace cairn

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
 
+#include "runtime/beams/beam_model.h"
+#include "runtime/beams/plan_rays.h"
 #include "runtime/scans/beam.h"
 #include "tests/decompose_views/plan_fixture.h"
 #include "tests/runtime/beams/laser_fixture.h"
@@ -238,6 +240,11 @@ TEST(ScanLocator, InACorridorThePlaceAlongItIsNotKnown) {
       EXPECT_GT(std::sqrt(found.covariance(0, 0)), (length - 20) / std::sqrt(12.0));
       EXPECT_LT(std::sqrt(found.covariance(0, 0)), length / std::sqrt(12.0));
       EXPECT_LT(std::sqrt(found.covariance(1, 1)), 0.2);
+      // In their middle.
+      const bool is_ahead = std::abs(WrapAngle(found.pose.heading_rad)) < 1;
+      const double along = is_ahead ? found.pose.position.x() : length - found.pose.position.x();
+      EXPECT_GT(along, (length - 20) / 2 - 1);
+      EXPECT_LT(along, length / 2 + 1);
       EXPECT_NEAR(found.pose.position.y(), std::abs(WrapAngle(found.pose.heading_rad)) < 1 ? 0.8 : 1.2, 0.05);
     }
   }
@@ -342,6 +349,68 @@ TEST(ScanLocator, RefusesWhatItCannotUse) {
   EXPECT_THAT(locator->Locate(blind).error().message, HasSubstr("2 of 100 beams"));
   blind.beams[50].met = true;
   EXPECT_TRUE(locator->Locate(blind).ok());
+}
+
+// Of one place, which beams of five sectors met: its odds are those of the beams against a plan without
+// walls, but for what the best of many poses explains by chance.
+TEST(ScanLocator, ProbabilityIsByTheOddsAgainstAPlanWithoutWalls) {
+  const Views views = PlanOf(OddRoom());
+  const PlanarPose pose{{3, 2.5}, 0.3};
+  Random random(1);
+  const std::vector<Beam> all = BeamsAt(views.plan.walls, pose, 0, &random);
+  for (const int num_each : {1, 4}) {
+    ScanView scan;
+    for (const int degree : {-82, -58, 1, 38, 74}) {
+      for (int k = 0; k < num_each; ++k) {
+        Beam beam = all[90 + degree + k];
+        beam.range_m += 0.35 * (k % 2 == 0 ? 1 : -1);  // as in a place that is not quite the plan's
+        scan.beams.push_back(beam);
+      }
+    }
+    const auto located = ScanLocator::Make(views, {})->LocateNear(scan, std::span(&pose, 1));
+    ASSERT_TRUE(located.ok());
+    ASSERT_EQ(located->hypotheses.size(), 1U);
+    const ScanHypothesis& found = located->hypotheses[0];
+    const PlanRays rays(views.plan.walls);
+    const BeamModel model(views.plan.walls, rays, {});
+    const double evidence =
+        (model.Weigh(scan.beams, found.pose).log_likelihood - model.WeighWithoutWalls(scan.beams)) / num_each;
+    EXPECT_NEAR(found.probability, 1 / (1 + std::exp(3 - evidence)), 1e-9);
+    EXPECT_LT(found.probability, 0.999);
+  }
+}
+
+// One segment, 5 cm before its wall, among beams that say where the robot is.
+TEST(ScanLocator, AMatchedSegmentIsSoFarFromItsWall) {
+  const Views views = PlanOf(OddRoom());
+  const PlanarPose pose{{4, 1.5}, 0};
+  Random random(1);
+  ScanView scan{.beams = BeamsAt(views.plan.walls, pose, 0, &random)};
+  scan.segments = {{{-1, -1.45}, {1, -1.45}, 0.01, 0.01, 20}};
+  const auto located = ScanLocator::Make(views, {})->LocateNear(scan, std::span(&pose, 1));
+  const ScanHypothesis& found = located->hypotheses.at(0);
+  EXPECT_EQ(found.num_matched, 1);
+  EXPECT_NEAR(found.matched_length_m, 2, 1e-9);
+  EXPECT_NEAR(found.rms_m, 0.05, 2e-3);
+  scan.segments[0].start.y() = scan.segments[0].end.y() = -0.5;  // at no wall
+  const auto without = ScanLocator::Make(views, {})->LocateNear(scan, std::span(&pose, 1));
+  EXPECT_EQ(without->hypotheses.at(0).num_matched, 0);
+  EXPECT_EQ(without->hypotheses.at(0).rms_m, 0);
+}
+
+TEST(ScanLocator, OptionsAreDescribedOnceAndHaveTheirRanges) {
+  ScanLocatorOptions options;
+  std::vector<std::string> names;
+  for (const Option& option : DescribeOptions(&options)) names.push_back(option.name);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "search"), 1);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "first_only"), 0);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "max_null_ratio"), 1);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "sigma_wall_m"), 1);
+  for (const auto& [least_odds, is_right] :
+       {std::pair(1e-9, true), {0.9e-9, false}, {1.0, true}, {1.1, false}}) {
+    options.least_odds = least_odds;
+    EXPECT_EQ(CheckOptions(DescribeOptions(&options)).ok(), is_right) << least_odds;
+  }
 }
 
 }  // namespace

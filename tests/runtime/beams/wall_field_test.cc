@@ -106,5 +106,37 @@ TEST(CellGrid, LargePlansHaveLargerCells) {
   EXPECT_EQ(GridAround({}, 1, 0.5, 100).size(), 25u);
 }
 
+// Layers are 45 degrees apart, and each has walls up to 37 degrees off: 14.5 more than half of that.
+TEST(WallField, ALayerHasWallsOfSoMuchOtherDirections) {
+  for (const auto& [degree, is_in] :
+       {std::pair(36.9, true), {37.1, false}, {-36.9, true}, {-37.1, false}, {143.1, true}, {142.9, false}}) {
+    const Vec2 along(std::cos(RadFromDeg(degree)), std::sin(RadFromDeg(degree)));
+    const std::vector<PlanWall> walls = {{-along, along}};
+    const WallField field(walls);
+    const Eigen::Vector2i cell = field.grid().CellOf({0, 0});
+    EXPECT_EQ(field.Best(0, 0, cell.x(), cell.y()) > 0, is_in) << degree;
+    EXPECT_GT(field.Best(WallField::kAllWalls, 0, cell.x(), cell.y()), 150);
+  }
+}
+
+// On the bisector of a corner both walls are equally near, whatever their directions.
+TEST(WallField, OfWallsThatAreEquallyNearTheFirstIsTheNearest) {
+  const std::vector<PlanWall> upright_first = {{{0, 0}, {0, 2}}, {{0, 0}, {2, 0}}};
+  const std::vector<PlanWall> level_first = {{{0, 0}, {2, 0}}, {{0, 0}, {0, 2}}};
+  for (const auto& walls : {upright_first, level_first}) {
+    const WallField field(walls);
+    const CellGrid& grid = field.grid();
+    ASSERT_EQ(grid.low.x(), grid.low.y());
+    int num_near = 0;
+    for (int k = 0; k < grid.num_rows; ++k) {
+      const Vec2 middle = grid.Middle(k, k);
+      if (middle.x() <= 0 || middle.x() > 0.35) continue;
+      EXPECT_EQ(field.NearestWall(middle), 0) << middle.x();
+      ++num_near;
+    }
+    EXPECT_GE(num_near, 3);
+  }
+}
+
 }  // namespace
 }  // namespace cairn
