@@ -303,7 +303,7 @@ class TreeSearch {
   void PairAtPose(Interpretation found, int num_nulls, const std::vector<LabelIdx>& labels) {
     for (const int segment : order_) {
       if (found.labels[segment] != kOpen) continue;
-      found.labels[segment] = BestLabel(found, segment, labels);
+      found.labels[segment] = BestLabel(found, segment, labels, found.labels);
       if (done_) return;
       if (found.labels[segment] == kNull) {
         if (++num_nulls > max_nulls_) return;
@@ -312,20 +312,28 @@ class TreeSearch {
       ++result_.num_expanded;
       FitPose(plan_, segments_, &found);
     }
-    std::vector<LabelIdx> again;
-    for (int segment = 0; segment < static_cast<int>(segments_.size()) && !done_; ++segment)
-      again.push_back(BestLabel(found, segment, labels));
-    if (done_) return;
+    std::vector<LabelIdx> again(segments_.size(), kOpen);
+    for (const int segment : order_) {
+      again[segment] = BestLabel(found, segment, labels, again);
+      if (done_) return;
+    }
     const bool enough = std::count(again.begin(), again.end(), kNull) <= max_nulls_;
     Finish(enough ? again : found.labels);
   }
 
-  LabelIdx BestLabel(const Interpretation& found, int segment, const std::vector<LabelIdx>& labels) {
+  // Whether a label has a segment already, of which it may have no more.
+  bool IsTaken(LabelIdx label, const std::vector<LabelIdx>& so_far) const {
+    return options_.one_segment_per_wall && std::find(so_far.begin(), so_far.end(), label) != so_far.end();
+  }
+
+  // `so_far`: of the other segments.
+  LabelIdx BestLabel(const Interpretation& found, int segment, const std::vector<LabelIdx>& labels,
+                     const std::vector<LabelIdx>& so_far) {
     LabelIdx best = kNull;
     double best_misfit = 1;
     for (const LabelIdx label : labels) {
       if (!CountNode()) return kNull;
-      if (!table_.Of(segment, label).possible) continue;
+      if (!table_.Of(segment, label).possible || IsTaken(label, so_far)) continue;
       const double misfit = found_.Misfit(found, segment, label);
       if (misfit >= best_misfit) continue;
       best = label;
@@ -346,12 +354,15 @@ class TreeSearch {
       const std::vector<PlaceStretch> over = StretchesOver(stretches, 0.5 * (place.low + place.high));
       Interpretation found;
       found.labels = labels_;
-      int widest = over.front().segment;
+      int widest = -1;  // of those that get a label
       for (const PlaceStretch& stretch : over) {
         if (!CountNode()) return;
+        if (IsTaken(stretch.label, found.labels)) continue;
         found.labels[stretch.segment] = stretch.label;
-        if (SineBetween(first, stretch.segment) > SineBetween(first, widest)) widest = stretch.segment;
+        if (widest < 0 || SineBetween(first, stretch.segment) > SineBetween(first, widest))
+          widest = stretch.segment;
       }
+      if (widest < 0) continue;
       FitPose(plan_, segments_, &found);
       if (found.determined) {
         labels_[widest] = found.labels[widest];
