@@ -81,8 +81,7 @@ TEST(PlanInMap, DerivedRegionsAreCountedAsWhatTheyTake) {
                         list(found->parents) + list(found->toggle_offsets) + list(found->toggled_labels) +
                         list(found->index) + list(found->links) + list(found->plan.vertices) +
                         list(found->plan.pieces) + list(found->plan.walls);
-  EXPECT_GT(map->num_kept_bytes() - before, taken);
-  EXPECT_LT(map->num_kept_bytes() - before, taken + 2000);  // and the structs themselves
+  EXPECT_EQ(map->num_kept_bytes() - before, taken + static_cast<int64_t>(sizeof(Views) + sizeof(FloorPlan)));
 }
 
 TEST(PlanInMap, AMapWithoutAPlanSaysSo) {
