@@ -175,5 +175,20 @@ TEST(SearchPoses, HeadingsBeginAtNone) {
   EXPECT_EQ(SearchPoses(field, ends, {.step_deg = 15}).poses.at(0).pose.heading_rad, 0);
 }
 
+// In a corner, whichever of its walls is the first.
+TEST(RefineByEnds, BringsEndsToTheirWalls) {
+  const PlanWall lower = {{0, 0}, {6, 0}}, left = {{0, 6}, {0, 0}};
+  const PlanarPose pose{{2, 1.5}, -2.2};
+  for (const auto& walls : {std::vector{lower, left}, std::vector{left, lower}}) {
+    const WallField field(walls);
+    Random random(1);
+    const auto ends = EndsApart(BeamsAt(walls, pose, 0, &random), 0.15);
+    const PlanarPose near{pose.position + Vec2(0.08, -0.06), pose.heading_rad + 0.03};
+    const PlanarPose refined = RefineByEnds(field, walls, ends, near);
+    EXPECT_LT((refined.position - pose.position).norm(), 1e-3);
+    EXPECT_LT(Turn(refined, pose), 1e-3);
+  }
+}
+
 }  // namespace
 }  // namespace cairn
