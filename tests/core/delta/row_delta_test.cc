@@ -7,6 +7,7 @@
 
 #include "core/delta/map_delta.h"
 #include "core/delta/renumbering.h"
+#include "core/delta/row_text.h"
 #include "core/files/file.h"
 #include "tests/core/delta/two_maps.h"
 #include "tests/core/map/packed_rows.h"
@@ -215,6 +216,20 @@ TEST(RowDelta, ACodeIsTheFirstMapsOrItsOwnAndHasAStep) {
   EXPECT_TRUE(ApplyRowDelta(rows, own_code(1), kMuch, "delta").ok());
   EXPECT_EQ(ApplyRowDelta(rows, own_code(0), kMuch, "delta").error().message,
             "delta: its landmarks make no sense");
+}
+
+// Deltas are read by other versions, too: row_delta.h says how they are laid out.
+TEST(RowDelta, HasItsListsIn64sAndThenTheText) {
+  const MapRows from = Coded(SmallRows());
+  MapRows to = from;
+  to.regions.resize(65, to.regions[0]);
+  const std::string delta = Made(from, to);
+  BlobReader reader(std::string_view(delta).substr(HeadOf(from, 65).Take().size()));
+  EXPECT_EQ(reader.UInt8(), 0) << "the first map's code";
+  // New landmarks; what images see, in one; landmarks of regions and stations of regions, in two each.
+  for (int i = 0; i < 1 + 1 + 2 + 2; ++i) EXPECT_FALSE(reader.Bytes(reader.Varint()).empty()) << i;
+  EXPECT_EQ(reader.Varint(), WriteRowText(to).size());
+  EXPECT_TRUE(reader.ok());
 }
 
 TEST(RowDelta, RefusesMoreInListsThanItMayTake) {
