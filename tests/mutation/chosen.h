@@ -1,5 +1,5 @@
-// All changes of a room in one program: CAIRN_CHANGE names the one that is made, and none is without it.  schemata.py writes what uses
-// this before the room's sources.
+// All changes of a room in one program: CAIRN_CHANGE names the one that is made, and none is without it.
+// schemata.py writes what uses this before the room's sources.
 //
 //   a < b        a < mutation::Less{1, 2} < b       binds as the operator does, whatever stands around it
 //   a += b       a += mutation::Add{3} += b
@@ -47,11 +47,13 @@ inline const Choice kChoice;
 
 // Changes are counted from 1; 0 is one that is not tried.
 MUTATION_INLINE bool Is(int change) {
-  if (kChoice.reached) [[unlikely]] kChoice.reached[change] = 1;
+  if (kChoice.reached) [[unlikely]]
+    kChoice.reached[change] = 1;
   return change && kChoice.change == change;
 }
 
-// What an expression computes is kept, not how: a sum of matrices that is returned may not refer to what is gone by then.
+// What an expression computes is kept, not how: a sum of matrices that is returned may not refer to what is
+// gone by then.
 template <class T>
 MUTATION_INLINE auto Value(T&& value) {
   if constexpr (requires { value.eval(); }) {
@@ -62,37 +64,37 @@ MUTATION_INLINE auto Value(T&& value) {
 }
 
 // `first` for the change `first`, `second` for `second`.
-#define MUTATION_OPERATOR(NAME, OP, FIRST, SECOND)                                                          \
-  struct NAME {                                                                                             \
-    int first, second = 0;                                                                                  \
-  };                                                                                                        \
-  template <class A>                                                                                        \
-  struct Left##NAME {                                                                                       \
-    A&& a;                                                                                                  \
-    NAME changes;                                                                                           \
-  };                                                                                                        \
-  template <class A>                                                                                        \
-  MUTATION_INLINE Left##NAME<A> operator OP(A&& a, NAME changes) {                                          \
-    return {std::forward<A>(a), changes};                                                                   \
-  }                                                                                                         \
-  template <class A, class B>                                                                               \
-  MUTATION_INLINE auto operator OP(Left##NAME<A> left, B&& b) {                                             \
-    using Type = decltype(Value(std::forward<A>(left.a) OP std::forward<B>(b)));                            \
-    if (Is(left.changes.first)) {                                                                           \
-      if constexpr (requires { Type(Value(std::forward<A>(left.a) FIRST std::forward<B>(b))); }) {          \
-        return Type(Value(std::forward<A>(left.a) FIRST std::forward<B>(b)));                               \
-      } else {                                                                                              \
-        std::_Exit(kNoSuchChange);                                                                          \
-      }                                                                                                     \
-    }                                                                                                       \
-    if (Is(left.changes.second)) {                                                                          \
-      if constexpr (requires { Type(Value(std::forward<A>(left.a) SECOND std::forward<B>(b))); }) {         \
-        return Type(Value(std::forward<A>(left.a) SECOND std::forward<B>(b)));                              \
-      } else {                                                                                              \
-        std::_Exit(kNoSuchChange);                                                                          \
-      }                                                                                                     \
-    }                                                                                                       \
-    return Value(std::forward<A>(left.a) OP std::forward<B>(b));                                            \
+#define MUTATION_OPERATOR(NAME, OP, FIRST, SECOND)                                                  \
+  struct NAME {                                                                                     \
+    int first, second = 0;                                                                          \
+  };                                                                                                \
+  template <class A>                                                                                \
+  struct Left##NAME {                                                                               \
+    A&& a;                                                                                          \
+    NAME changes;                                                                                   \
+  };                                                                                                \
+  template <class A>                                                                                \
+  MUTATION_INLINE Left##NAME<A> operator OP(A&& a, NAME changes) {                                  \
+    return {std::forward<A>(a), changes};                                                           \
+  }                                                                                                 \
+  template <class A, class B>                                                                       \
+  MUTATION_INLINE auto operator OP(Left##NAME<A> left, B&& b) {                                     \
+    using Type = decltype(Value(std::forward<A>(left.a) OP std::forward<B>(b)));                    \
+    if (Is(left.changes.first)) {                                                                   \
+      if constexpr (requires { Type(Value(std::forward<A>(left.a) FIRST std::forward<B>(b))); }) {  \
+        return Type(Value(std::forward<A>(left.a) FIRST std::forward<B>(b)));                       \
+      } else {                                                                                      \
+        std::_Exit(kNoSuchChange);                                                                  \
+      }                                                                                             \
+    }                                                                                               \
+    if (Is(left.changes.second)) {                                                                  \
+      if constexpr (requires { Type(Value(std::forward<A>(left.a) SECOND std::forward<B>(b))); }) { \
+        return Type(Value(std::forward<A>(left.a) SECOND std::forward<B>(b)));                      \
+      } else {                                                                                      \
+        std::_Exit(kNoSuchChange);                                                                  \
+      }                                                                                             \
+    }                                                                                               \
+    return Value(std::forward<A>(left.a) OP std::forward<B>(b));                                    \
   }
 MUTATION_OPERATOR(Less, <, <=, >)
 MUTATION_OPERATOR(LessEqual, <=, <, <)
@@ -106,31 +108,31 @@ MUTATION_OPERATOR(Times, *, /, /)
 MUTATION_OPERATOR(Over, /, *, *)
 #undef MUTATION_OPERATOR
 
-#define MUTATION_ASSIGNMENT(NAME, OP, CHANGED)                             \
-  template <class B>                                                       \
-  struct Right##NAME {                                                     \
-    B&& b;                                                                 \
-    int change;                                                            \
-  };                                                                       \
-  struct NAME {                                                            \
-    int change;                                                            \
-    template <class B>                                                     \
-    MUTATION_INLINE Right##NAME<B> operator OP(B&& b) const {              \
-      return {std::forward<B>(b), change};                                 \
-    }                                                                      \
-  };                                                                       \
-  template <class A, class B>                                              \
+#define MUTATION_ASSIGNMENT(NAME, OP, CHANGED)                              \
+  template <class B>                                                        \
+  struct Right##NAME {                                                      \
+    B&& b;                                                                  \
+    int change;                                                             \
+  };                                                                        \
+  struct NAME {                                                             \
+    int change;                                                             \
+    template <class B>                                                      \
+    MUTATION_INLINE Right##NAME<B> operator OP(B&& b) const {               \
+      return {std::forward<B>(b), change};                                  \
+    }                                                                       \
+  };                                                                        \
+  template <class A, class B>                                               \
   MUTATION_INLINE decltype(auto) operator OP(A&& a, Right##NAME<B> right) { \
-    if (Is(right.change)) {                                                \
-      if constexpr (requires { a CHANGED std::forward<B>(right.b); }) {    \
-        a CHANGED std::forward<B>(right.b);                                \
-        return std::forward<A>(a);                                         \
-      } else {                                                             \
-        std::_Exit(kNoSuchChange);                                         \
-      }                                                                    \
-    }                                                                      \
-    a OP std::forward<B>(right.b);                                         \
-    return std::forward<A>(a);                                             \
+    if (Is(right.change)) {                                                 \
+      if constexpr (requires { a CHANGED std::forward<B>(right.b); }) {     \
+        a CHANGED std::forward<B>(right.b);                                 \
+        return std::forward<A>(a);                                          \
+      } else {                                                              \
+        std::_Exit(kNoSuchChange);                                          \
+      }                                                                     \
+    }                                                                       \
+    a OP std::forward<B>(right.b);                                          \
+    return std::forward<A>(a);                                              \
   }
 MUTATION_ASSIGNMENT(Add, +=, -=)
 MUTATION_ASSIGNMENT(Subtract, -=, +=)

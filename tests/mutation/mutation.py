@@ -249,7 +249,7 @@ class Room:
         return set(active)
 
     def find_suites(self, objects):
-        """Links and runs all tests once; False where some fail, as they are."""
+        """Links and runs all tests once, as they are."""
         for test in self.tests:
             name, *options = test.split()
             program = next((suite.program for suite in self.suites if suite.program.name.endswith(f"_all_{name}")), None) or self.program(name, objects, "all")
@@ -270,9 +270,8 @@ class Room:
             file.write_bytes(bytes(max(self.changes) + 1))
             code, suite.time_s = run(suite.command(), self.build.folder, 600, {**os.environ, "TEST_TMPDIR": str(self.folder), "CAIRN_REACHED": str(file)})
             if code:
-                return False
+                give_up(f"its tests fail as they are: {' '.join(suite.command())}")
             suite.reached = file.read_bytes()
-        return True
 
     def outcome(self, k, slot):
         """Of a change: "noticed", "survived", "not reached" or, where it does not compile, "broken"."""
@@ -396,9 +395,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="mutation_", dir=arguments.build) as folder:
         room = Room(root, Build(arguments.build.resolve()), entry["tests"], pathlib.Path(folder).resolve(), texts, drawn)
         try:
-            if not room.find_suites(room.compile_schemata()):
-                print(f"{arguments.room}: its tests fail as they are", file=sys.stderr)
-                return 2
+            room.find_suites(room.compile_schemata())
             print(f"{len(drawn) - len(room.alone)} compiled at once, {len(room.alone)} alone; {len(room.suites)} suites of tests, "
                   f"{sum(suite.time_s for suite in room.suites):.0f} s", flush=True)
             counts = tried(room, arguments.num, arguments.jobs)
