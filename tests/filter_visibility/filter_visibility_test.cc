@@ -526,6 +526,17 @@ TEST(FindStations, HeadingsOfADrivenSurveyAreOfTheNearestBin) {
               ElementsAre(std::pair(0, 1), std::pair(0, 3), std::pair(1, 2), std::pair(2, 3)));
 }
 
+TEST(FindStations, TwoHeadingsAreToldApartAndOneIsNone) {
+  const std::vector<SurveyImage> images = {{.image_id = 1, .cam_from_world = CameraAt(0.1, 0.1, 10)},
+                                           {.image_id = 2, .cam_from_world = CameraAt(0.1, 0.1, 170)}};
+  FilterVisibilityOptions options;
+  options.survey = "driven";
+  options.heading_bin_deg = 180;
+  EXPECT_THAT(FindStations(images, options)->world.headings_deg, ElementsAre(0, 180));
+  options.heading_bin_deg = 360;
+  EXPECT_THAT(FindStations(images, options)->world.headings_deg, IsEmpty());
+}
+
 TEST(FindStations, UpNearAnAxisIsTheAxis) {
   const auto floor_of = [](double tilt_deg, double up_snap_deg, const Eigen::Vector3d& axis) {
     // Cameras that stand upright in a world whose up is `tilt_deg` from an axis.
@@ -553,7 +564,7 @@ TEST(FindStations, UpNearAnAxisIsTheAxis) {
 TEST(FindStations, UpThatIsNoDirectionIsAnError) {
   std::vector<SurveyImage> images = TurnedAt(Grid(2, 1), 0, 0);
   FilterVisibilityOptions options;
-  for (const char* up : {"0,0", "0,0,0", "0,0,1,0"}) {
+  for (const char* up : {"0,0", "0,0,0", "0,0,1,0", "0,0,9e-10"}) {
     options.up = up;
     const Result<Stations> stations = FindStations(images, options);
     ASSERT_FALSE(stations.ok()) << up;
