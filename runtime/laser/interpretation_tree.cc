@@ -317,8 +317,13 @@ class TreeSearch {
       again[segment] = BestLabel(found, segment, labels, again);
       if (done_) return;
     }
-    const bool enough = std::count(again.begin(), again.end(), kNull) <= max_nulls_;
-    Finish(enough ? again : found.labels);
+    const auto nulls = [](const std::vector<LabelIdx>& of) {
+      return std::count(of.begin(), of.end(), kNull);
+    };
+    // Where each wall has one segment, one that was left out before may take another's.
+    const bool is_no_worse =
+        nulls(again) <= (options_.one_segment_per_wall ? nulls(found.labels) : max_nulls_);
+    Finish(is_no_worse ? again : found.labels);
   }
 
   // Whether a label has a segment already, of which it may have no more.
@@ -351,7 +356,14 @@ class TreeSearch {
     const int first = order_[num_nulls];
     if (candidates != nullptr && regions_.Seeing(*candidates, table_, first, labels_[first]).empty()) return;
     for (const SupportedPlaces& place : places) {
-      const std::vector<PlaceStretch> over = StretchesOver(stretches, 0.5 * (place.low + place.high));
+      std::vector<PlaceStretch> over = StretchesOver(stretches, 0.5 * (place.low + place.high));
+      if (options_.one_segment_per_wall) {
+        // The longest ones choose first.
+        const auto rank = [&](const PlaceStretch& stretch) {
+          return std::find(order_.begin(), order_.end(), stretch.segment);
+        };
+        std::sort(over.begin(), over.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+      }
       Interpretation found;
       found.labels = labels_;
       int widest = -1;  // of those that get a label

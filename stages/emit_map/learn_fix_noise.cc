@@ -26,7 +26,7 @@ constexpr size_t kMinNumKeypoints = 40;  // that an image is placed by
 // Every one of an image's keypoints, every fourth, and every sixteenth.
 constexpr std::array<size_t, 3> kSteps = {1, 4, 16};
 constexpr double kMaxScale = 1e5;
-constexpr double kNineOfTen6 = 10.645;  // of chi-square with 6 degrees of freedom
+constexpr double kNineOfTenOfSix = 10.645;  // of chi-square with 6 degrees of freedom
 // Landmarks that other images place worse than this are no landmarks of theirs, m (standard deviation).
 constexpr double kMaxSigmaM = 0.2;
 
@@ -168,7 +168,7 @@ class FixNoiseLearner {
       }
       if (squares.size() < kMinNumFixesTried) continue;
       factors.push_back(
-          {num_inliers / static_cast<double>(squares.size()), Quantile(squares, 0.9) / kNineOfTen6});
+          {num_inliers / static_cast<double>(squares.size()), Quantile(squares, 0.9) / kNineOfTenOfSix});
     }
     if (factors.empty()) return std::nullopt;
     return FitFixNoise(factors);

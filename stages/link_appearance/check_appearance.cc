@@ -87,20 +87,20 @@ ChosenSets Choose(const AppearanceGraph& graph, NodeIdx left_out, const std::vec
                   const std::vector<Kind>& curves, int max_size, uint64_t seed, Progress& progress) {
   ChosenSets chosen;
   CancelOnly quiet(progress);  // only left-out images are reported, not the tries of each search
-  std::vector<NodeIdx> other_nodes;
+  std::vector<NodeIdx> others;
   for (NodeIdx node = 0; node < graph.num_nodes(); ++node) {
-    if (node != left_out) other_nodes.push_back(node);
+    if (node != left_out) others.push_back(node);
   }
-  const AppearanceGraph others = InducedSubgraph(graph, other_nodes);
   for (const Kind& kind : sets) {
-    // Of a given size: the left-out node, which stands alone by now, is none of so many.
-    const bool is_without = kind.options.num_kept > 0;
-    const std::vector<NodeRole> roles =
-        ChooseKept(is_without ? others : graph, kind.options, seed, nullptr, &quiet);
+    // A set of a given size is chosen from the others: the left-out node stands alone by now, and would be
+    // kept.
+    const bool is_of_others = left_out >= 0 && kind.options.num_kept > 0;
+    const std::vector<NodeRole> roles = ChooseKept(is_of_others ? InducedSubgraph(graph, others) : graph,
+                                                   kind.options, seed, nullptr, &quiet);
     std::vector<char> kept(graph.num_nodes(), 0);
     int num_kept = 0;
     for (size_t i = 0; i < roles.size(); ++i) {
-      const NodeIdx node = is_without ? other_nodes[i] : static_cast<NodeIdx>(i);
+      const NodeIdx node = is_of_others ? others[i] : static_cast<NodeIdx>(i);
       kept[node] = node != left_out && roles[i] != NodeRole::kDropped;
       num_kept += kept[node];
     }

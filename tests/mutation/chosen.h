@@ -7,8 +7,7 @@
 //
 // CAIRN_REACHED names a file with a byte for each change, which is 1 where a run came by it.
 
-#ifndef TESTS_MUTATION_CHOSEN_H_
-#define TESTS_MUTATION_CHOSEN_H_
+#pragma once
 
 #include <algorithm>
 #include <cstdlib>
@@ -27,6 +26,8 @@ namespace mutation {
 
 // Of a change that cannot be compiled for the types that stand there.
 inline constexpr int kNoSuchChange = 97;
+// Where CAIRN_REACHED cannot be written.
+inline constexpr int kNotRecorded = 98;
 
 struct Choice {
   int change = std::getenv("CAIRN_CHANGE") ? std::atoi(std::getenv("CAIRN_CHANGE")) : 0;
@@ -35,12 +36,14 @@ struct Choice {
   // Shared with the file, so that it is there however the process ends.
   static char* Reached() {
     const char* name = std::getenv("CAIRN_REACHED");
-    const int file = name ? open(name, O_RDWR | O_CLOEXEC) : -1;
+    if (!name) return nullptr;
+    const int file = open(name, O_RDWR | O_CLOEXEC);
     struct stat state;
-    if (file < 0 || fstat(file, &state)) return nullptr;
+    if (file < 0 || fstat(file, &state)) std::_Exit(kNotRecorded);
     void* bytes = mmap(nullptr, state.st_size, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    if (bytes == MAP_FAILED) std::_Exit(kNotRecorded);
     close(file);
-    return bytes == MAP_FAILED ? nullptr : static_cast<char*>(bytes);
+    return static_cast<char*>(bytes);
   }
 };
 inline const Choice kChoice;
@@ -180,5 +183,3 @@ MUTATION_INLINE Bound Min(int change) { return {!Is(change)}; }
 MUTATION_INLINE Bound Max(int change) { return {Is(change)}; }
 
 }  // namespace mutation
-
-#endif  // TESTS_MUTATION_CHOSEN_H_

@@ -14,6 +14,7 @@ rooms.toml says; 1, fewer; 2, something is wrong with the arguments or with the 
 
 import argparse
 import concurrent.futures
+import contextlib
 import dataclasses
 import json
 import math
@@ -25,9 +26,11 @@ import re
 import resource
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import tomllib
 
@@ -35,7 +38,6 @@ from changes import changes_of, is_listed
 from schemata import schema_of
 
 MEMORY_BYTES = 8 << 30
-FILE_BYTES = 1 << 30
 COMPILE_LIMIT_S = 1200
 NO_SUCH_CHANGE = 97  # chosen.h
 MAX_ATTEMPTS = 12  # to compile all that the compiler takes together
@@ -129,10 +131,10 @@ class Build:
         to = folder / f"precompiled_{len(self.headers)}" / header.name
         to.parent.mkdir()
         to.write_text("\n".join(re.findall("^#include.*$", header.read_text(), re.MULTILINE)))
-        compile = self.compile(source, to, f"{to}.gch")
-        place = compile.index("-include")
-        compile[place : place + 2] = ["-x", "c++-header"]
-        subprocess.run(compile, cwd=self.folder, check=True, stdout=subprocess.DEVNULL)
+        command = self.compile(source, to, f"{to}.gch")
+        place = command.index("-include")
+        command[place : place + 2] = ["-x", "c++-header"]
+        subprocess.run(command, cwd=self.folder, check=True, stdout=subprocess.DEVNULL)
         self.headers[str(header)] = str(to)
 
     def link(self, test, changed, to):
@@ -151,32 +153,38 @@ class Suite:
     """Tests of one program that are run together."""
     program: pathlib.Path
     options: list
-    time_s: float = 0
+    cpu_s: float = 0
+    wall_s: float = 0
     reached: bytes = b""
 
     def command(self):
         return [str(self.program), *self.options, "--gtest_brief=1", "--gtest_fail_fast"]
 
 
-def run(command, folder, cpu_limit_s, env=None, errors=subprocess.DEVNULL):
-    """The exit code of a command, and how long it took; a command that takes more is stopped."""
+@dataclasses.dataclass(frozen=True)
+class Done:
+    code: int
+    cpu_s: float
+    wall_s: float
+
+
+def run(command, folder, cpu_limit_s, wall_limit_s, env=None, errors=subprocess.DEVNULL):
+    """Runs a command, and stops it, and what it started, where it takes longer."""
     def limits():
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(cpu_limit_s), math.ceil(cpu_limit_s) + 1))
-        os.setpgid(0, 0)
 
     quiet, start = subprocess.DEVNULL, time.monotonic()
-    child = subprocess.Popen(command, cwd=folder, env=env, stdin=quiet, stdout=quiet, stderr=errors, preexec_fn=limits)
-    try:
-        # One that waits for ever has no time of its own.
-        code = child.wait(60 + 4 * cpu_limit_s)
-    except subprocess.TimeoutExpired:
-        os.killpg(child.pid, 9)
-        child.wait()
-        code = -9
-    return code, time.monotonic() - start
+    child = subprocess.Popen(command, cwd=folder, env=env, stdin=quiet, stdout=quiet, stderr=errors, preexec_fn=limits, process_group=0)
+    late = threading.Timer(wall_limit_s, lambda: os.killpg(child.pid, signal.SIGKILL))
+    late.start()
+    _, status, usage = os.wait4(child.pid, 0)
+    late.cancel()
+    child.returncode = os.waitstatus_to_exitcode(status)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child.pid, signal.SIGKILL)
+    return Done(child.returncode, usage.ru_utime + usage.ru_stime, time.monotonic() - start)
 
 
 class Room:
@@ -197,14 +205,14 @@ class Room:
         command = self.build.compile(self.root / source, changed, to)
         command = [word for word in command if not word.startswith("-W")] + ["-w", "-Wno-narrowing", *options]
         with open(f"{to}.errors", "w") as errors:
-            code, _ = run(command, self.build.folder, COMPILE_LIMIT_S, errors=errors)
+            code = run(command, self.build.folder, COMPILE_LIMIT_S, COMPILE_LIMIT_S, errors=errors).code
         return code, pathlib.Path(f"{to}.errors").read_text(errors="replace")
 
     def program(self, test, objects, label):
         # Beside the programs that tests start.
         to = self.build.folder / f"mutant_{os.getpid()}_{label}_{test}"
-        code, _ = run(self.build.link(test, objects, to), self.build.folder, COMPILE_LIMIT_S)
-        return to if code == 0 else None
+        done = run(self.build.link(test, objects, to), self.build.folder, COMPILE_LIMIT_S, COMPILE_LIMIT_S)
+        return to if done.code == 0 else None
 
     def compile_schemata(self):
         """Of all sources together that are compiled alike; what the compiler does not take is left for later, one by one."""
@@ -256,28 +264,37 @@ class Room:
             if program is None:
                 give_up(f"{name}: cannot be linked with the changed sources")
             listed = subprocess.run([str(program), *options, "--gtest_list_tests"], cwd=self.build.folder, capture_output=True, text=True, check=False,
-                                    env={**os.environ, "TEST_TMPDIR": str(self.folder)})
+                                    timeout=60)
+            if listed.returncode:
+                give_up(f"its tests fail as they are: {program} --gtest_list_tests")
             suites = {}
             for line in listed.stdout.splitlines():
                 if line.startswith("  "):
                     suites.setdefault(suite, []).append(suite + line.split()[0])
                 else:
                     suite = line.split("#")[0].strip()
-            filters = [["--gtest_filter=" + ":".join(names)] for names in suites.values()] or [options]
-            self.suites += [Suite(program, filter) for filter in filters if not any((filter, program) == (suite.options, suite.program) for suite in self.suites)]
+            known = [(suite.program, suite.options) for suite in self.suites]
+            chosen = [["--gtest_filter=" + ":".join(names)] for names in suites.values()] or [options]
+            self.suites += [Suite(program, each) for each in chosen if (program, each) not in known]
         file = self.folder / "reached"
         for suite in self.suites:
             file.write_bytes(bytes(max(self.changes) + 1))
-            code, suite.time_s = run(suite.command(), self.build.folder, 600, {**os.environ, "TEST_TMPDIR": str(self.folder), "CAIRN_REACHED": str(file)})
-            if code:
+            done = self.run_suite(suite.command(), 1200, 1200, {"CAIRN_REACHED": str(file)})
+            suite.cpu_s, suite.wall_s = done.cpu_s, done.wall_s
+            if done.code:
                 give_up(f"its tests fail as they are: {' '.join(suite.command())}")
             suite.reached = file.read_bytes()
+
+    def run_suite(self, command, cpu_limit_s, wall_limit_s, env):
+        """With a folder of its own for its files."""
+        with tempfile.TemporaryDirectory(dir=self.folder, ignore_cleanup_errors=True) as files:
+            return run(command, self.build.folder, cpu_limit_s, wall_limit_s, {**os.environ, "TEST_TMPDIR": files, **env})
 
     def outcome(self, k, slot):
         """Of a change: "noticed", "survived", "not reached" or, where it does not compile, "broken"."""
         folder = self.folder / str(slot)
         folder.mkdir(exist_ok=True)
-        programs, env = {}, {**os.environ, "TEST_TMPDIR": str(folder)}
+        programs, env = {}, {}
         suites = self.suites
         if k in self.alone:
             change = self.changes[k]
@@ -293,7 +310,7 @@ class Room:
                 return "not reached"
         # The quickest first, and those that noticed other changes of the file.
         file = self.changes[k].file
-        suites = sorted(suites, key=lambda suite: (0.05 + suite.time_s) / (1 + 4 * self.num_noticed.get((file, id(suite)), 0)))
+        suites = sorted(suites, key=lambda suite: (0.05 + suite.cpu_s) / (1 + 4 * self.num_noticed.get((file, id(suite)), 0)))
         try:
             for suite in suites:
                 program = suite.program
@@ -303,7 +320,7 @@ class Room:
                     program = programs[program]
                     if program is None:
                         return "broken"
-                code, _ = run([str(program), *suite.command()[1:]], self.build.folder, 4 + 5 * suite.time_s, env)
+                code = self.run_suite([str(program), *suite.command()[1:]], 4 + 5 * suite.cpu_s, 60 + 20 * suite.wall_s, env).code
                 if code == NO_SUCH_CHANGE:
                     return "broken"
                 if code:
@@ -367,10 +384,11 @@ def main():
         arguments.seed = commit_of(root)
     draw = random.Random(arguments.seed)
     if arguments.share:
-        arguments.room = draw.choice(sorted(rooms))
+        arguments.room = draw.choice(sorted(name for name in rooms if "noticed" in rooms[name]))
     if not arguments.room:
         for name, room in rooms.items():
-            print(f"{name:32} {room['noticed']:3} % by {' '.join(room['tests'])}")
+            figure = f"{room['noticed']:3} %" if "noticed" in room else "not measured,"
+            print(f"{name:32} {figure} by {' '.join(room['tests'])}")
         return 0
     if arguments.room not in rooms:
         print(f"{arguments.room}: not in {pathlib.Path(__file__).with_name('rooms.toml')}, which has {', '.join(rooms)}", file=sys.stderr)
@@ -397,16 +415,16 @@ def main():
         try:
             room.find_suites(room.compile_schemata())
             print(f"{len(drawn) - len(room.alone)} compiled at once, {len(room.alone)} alone; {len(room.suites)} suites of tests, "
-                  f"{sum(suite.time_s for suite in room.suites):.0f} s", flush=True)
+                  f"{sum(suite.wall_s for suite in room.suites):.0f} s", flush=True)
             counts = tried(room, arguments.num, arguments.jobs)
         finally:
             room.remove_programs()
-    num = counts["noticed"] + counts["survived"]
-    print(f"{arguments.room}: {counts['noticed']} of {num} changes noticed ({100 * counts['noticed'] / max(1, num):.0f} %; {entry['noticed']} % wanted), "
+    num, wanted = counts["noticed"] + counts["survived"], entry.get("noticed", 0)
+    print(f"{arguments.room}: {counts['noticed']} of {num} changes noticed ({100 * counts['noticed'] / max(1, num):.0f} %; {wanted} % wanted), "
           f"{counts['broken']} did not compile")
     if arguments.share:
-        return int(probability_of_at_most(counts["noticed"], num, entry["noticed"] / 100) < SIGNIFICANCE)
-    return int(counts["noticed"] < entry["noticed"] / 100 * num)
+        return int(probability_of_at_most(counts["noticed"], num, wanted / 100) < SIGNIFICANCE)
+    return int(counts["noticed"] < wanted / 100 * num)
 
 
 if __name__ == "__main__":

@@ -279,6 +279,8 @@ class Project(unittest.TestCase):
         self.assertIn("which has room", said)
         code, said = self.run_with(rooms)
         self.assertEqual((code, said.split()), (0, ["room", "95", "%", "by", "sum_test"]))
+        code, said = self.run_with('[room]\ntests = ["sum_test"]\n')
+        self.assertEqual((code, said.split()), (0, ["room", "not", "measured,", "by", "sum_test"]))
 
 
 if __name__ == "__main__":

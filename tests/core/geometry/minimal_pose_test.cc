@@ -77,7 +77,8 @@ TEST(PosesFromThreeRays, TheTruePoseIsAmongThemAndAllPutThePointsOnTheRays) {
     EXPECT_GE(num_found, 0.985 * kNumTrials) << extent_m;  // some are nearly double
     num_found_in_all += num_found;
   }
-  EXPECT_GE(num_found_in_all, 5934);  // of 6000, 12 to 20 by what eliminated the other depths alone
+  // Of 6000.  Some 20 are found by what eliminated the other depths alone; other processors round otherwise.
+  EXPECT_GE(num_found_in_all, 5930);
 }
 
 // As landmarks of a far wall are: seen in a small part of the image.

@@ -113,8 +113,8 @@ TEST_F(CodeIndexTest, ACodeIsNearUpToTheMostThatBitsMayCost) {
   }
 }
 
-// Of 6 places, 3 of each map; the image shows 4 landmarks of one and 1 of the next.
-//   expected by chance in two places: 2 * 5 / 6
+// Of 6 places, 3 of each map; the image shows 4 landmarks of one, 1 of the next and 1 of the other map.
+//   expected by chance in two places: 2 * 6 / 6
 TEST_F(CodeIndexTest, EvidenceIsHowImprobableSoManyAreInTwoPlaces) {
   const std::vector<int> all = Distinct(30);
   const auto at = [&](int begin) { return std::vector<int>(all.begin() + begin, all.begin() + begin + 5); };

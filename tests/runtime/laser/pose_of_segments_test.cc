@@ -1,5 +1,8 @@
 // What segments paired with walls say about a pose: by hand, by the cost that a fit is the least of, and by
 // trying points.
+#include <algorithm>
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -103,7 +106,7 @@ TEST(FitPose, IsThePoseOfLeastCost) {
   }
 }
 
-TEST(FitPose, IsThatOfLeastCostToo_WhereEndsLieBeyondTheirWalls) {
+TEST(FitPose, IsOfLeastCostWhereEndsLieBeyondTheirWallsToo) {
   const FloorPlan plan = SmallRoom();
   const PlanarPose pose{{2.1, 1}, 0.7};
   // The whole of two opposite walls 3 cm to the right of them, and less of a third.

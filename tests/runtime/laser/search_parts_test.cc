@@ -1,5 +1,6 @@
 // The parts of the search for interpretations, each against trying all.
 #include <algorithm>
+#include <numbers>
 #include <set>
 
 #include <gmock/gmock.h>

@@ -226,8 +226,9 @@ TEST(MachineClocks, AreThoseOfTheMachine) {
   for (int i = 0; i < 5; ++i) {
     const double before = wall_s();
     const MachineClocks now = ReadMachineClocks();
-    EXPECT_GE(now.wall_s, before - 1e-3);
-    EXPECT_LE(now.wall_s, wall_s() + 1e-3);
+    // A clock may be set meanwhile, by little.
+    EXPECT_GE(now.wall_s, before - 1);
+    EXPECT_LE(now.wall_s, wall_s() + 1);
     EXPECT_GT(now.boot_s, 0);
     EXPECT_EQ(now.boot_id, ReadMachineClocks().boot_id);
   }
