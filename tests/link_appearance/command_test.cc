@@ -163,7 +163,8 @@ TEST_F(LinkAppearanceCommandTest, OfImagesThatAreNotLocatedTwentyAreNamed) {
   EXPECT_THAT(twenty, Not(HasSubstr(" more\n")));
   EXPECT_THAT(more, HasSubstr("image59.jpg, 1 more\n"));
   // Two dominators are all of a pair; the set that is asked for is the one that counts.
-  EXPECT_EQ(missed(2, {"--num-dominators", "2"}), "");
+  EXPECT_EQ(missed(2, {"--num-dominators", "2"}),
+            "linked, and not located by the set 'as asked': image2.jpg, image5.jpg\n");
 }
 
 TEST_F(LinkAppearanceCommandTest, HeldOutImagesAreNamedInAListOrAsImagesText) {
