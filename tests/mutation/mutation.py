@@ -288,6 +288,7 @@ class Room:
     def run_suite(self, command, cpu_limit_s, wall_limit_s, env):
         """With a folder of its own for its files."""
         with tempfile.TemporaryDirectory(dir=self.folder, ignore_cleanup_errors=True) as files:
+            os.chmod(files, 0o755)  # tests become other users
             return run(command, self.build.folder, cpu_limit_s, wall_limit_s, {**os.environ, "TEST_TMPDIR": files, **env})
 
     def outcome(self, k, slot):
@@ -411,6 +412,7 @@ def main():
     # A few more, for those that do not compile.
     drawn = dict(enumerate(changes[: arguments.num * 4 // 3 + 4], 1))
     with tempfile.TemporaryDirectory(prefix="mutation_", dir=arguments.build) as folder:
+        os.chmod(folder, 0o755)
         room = Room(root, Build(arguments.build.resolve()), entry["tests"], pathlib.Path(folder).resolve(), texts, drawn)
         try:
             room.find_suites(room.compile_schemata())
