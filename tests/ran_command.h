@@ -1,10 +1,12 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -22,9 +24,10 @@ struct Ran {
   StageReport report;
 };
 
-// Runs `cairn stage NAME WORDS...` within the test, on one thread with seed 5.
-inline Ran RunWords(const Command& command, const std::vector<std::string>& words,
-                    int64_t memory_mib = 1 << 20) {
+// Runs `cairn stage NAME WORDS... MORE...` within the test, on one thread with seed 5.
+inline Ran RunWords(const Command& command, std::vector<std::string> words,
+                    const std::vector<std::string>& more = {}, int64_t memory_mib = 1 << 20) {
+  words.insert(words.end(), more.begin(), more.end());
   CLI::App app;
   ArgumentParser parser(app);
   command.add_arguments(parser);
@@ -46,5 +49,20 @@ inline Ran RunWords(const Command& command, const std::vector<std::string>& word
   ran.said = said.str();
   return ran;
 }
+
+// Has a folder of its own, which is empty when a test begins, and gone after it.
+class CommandTest : public testing::Test {
+ protected:
+  CommandTest() {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  ~CommandTest() override { std::filesystem::remove_all(folder_); }
+  std::string Path(const std::string& name) const { return folder_ / name; }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) /
+      testing::UnitTest::GetInstance()->current_test_info()->test_suite_name();
+};
 
 }  // namespace cairn

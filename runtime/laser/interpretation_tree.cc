@@ -366,15 +366,13 @@ class TreeSearch {
       }
       Interpretation found;
       found.labels = labels_;
-      int widest = -1;  // of those that get a label
+      int widest = over.front().segment;  // whose wall is free: it is not the first pairing's
       for (const PlaceStretch& stretch : over) {
         if (!CountNode()) return;
         if (IsTaken(stretch.label, found.labels)) continue;
         found.labels[stretch.segment] = stretch.label;
-        if (widest < 0 || SineBetween(first, stretch.segment) > SineBetween(first, widest))
-          widest = stretch.segment;
+        if (SineBetween(first, stretch.segment) > SineBetween(first, widest)) widest = stretch.segment;
       }
-      if (widest < 0) continue;
       FitPose(plan_, segments_, &found);
       if (found.determined) {
         labels_[widest] = found.labels[widest];

@@ -32,18 +32,12 @@ const SyntheticRoom& Room() {
 
 // The map of a room, and a capture of a survey image and four queries there, whose features are in a
 // database.
-class CheckMapCommandTest : public testing::Test {
+class CheckMapCommandTest : public CommandTest {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "check_map_command_test";
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     ASSERT_TRUE(WriteMapRows(Room().rows, Path("room.cairn")).ok());
     WriteCapture("capture", Room().camera, false);
   }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
-
   // `is_foreign`: of another place.
   void WriteCapture(const std::string& name, const Camera& camera, bool is_foreign) const {
     fs::create_directories(folder_ / name);
@@ -70,16 +64,12 @@ class CheckMapCommandTest : public testing::Test {
         WriteImagesText(Path(name + "/queries.txt"), {images[1], images[2], images[3], images[4]}).ok());
   }
   Ran Run(const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {Path("room.cairn")};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(CheckMapCommand(), words);
+    return RunWords(CheckMapCommand(), {Path("room.cairn")}, more);
   }
   std::string Refusal(const std::vector<std::string>& words) const {
     const Ran ran = Run(words);
     return ran.status.ok() ? "" : ran.status.error().message;
   }
-
-  fs::path folder_;
 };
 
 TEST_F(CheckMapCommandTest, LocalizesTheQueriesOfACaptureInTheMap) {

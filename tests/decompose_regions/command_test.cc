@@ -21,27 +21,16 @@ using testing::IsEmpty;
 using testing::Pair;
 using testing::SizeIs;
 
-class DecomposeRegionsCommandTest : public testing::Test {
+class DecomposeRegionsCommandTest : public CommandTest {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "decompose_regions_command_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
   std::string Written(const World& world) const {
     EXPECT_TRUE(WriteWorldJson(world, Path("world.json")).ok());
     return Path("world.json");
   }
   // decompose-regions WORLD -o regions.db WORDS...
   Ran Run(const World& world, const std::vector<std::string>& more, int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {Written(world), "-o", Path("regions.db")};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(DecomposeRegionsCommand(), words, memory_mib);
+    return RunWords(DecomposeRegionsCommand(), {Written(world), "-o", Path("regions.db")}, more, memory_mib);
   }
-
-  std::filesystem::path folder_;
 };
 
 // Two regions of three stations, and in between one that sees neither:   o o o o o o o
@@ -194,8 +183,8 @@ TEST_F(DecomposeRegionsCommandTest, RefusesWorldsAndClassesThatDoNotFitIntoMemor
     const std::string text = *ReadFile(world);
     std::ofstream(world) << text << std::string(world_bytes - text.size(), ' ');
     const Ran ran =
-        RunWords(DecomposeRegionsCommand(),
-                 {world, "-o", Path("regions.db"), "--classes", classes, "--k", "1", "--tau", "0"}, 66);
+        RunWords(DecomposeRegionsCommand(), {world, "-o", Path("regions.db"), "--classes", classes},
+                 {"--k", "1", "--tau", "0"}, 66);
     EXPECT_FALSE(ran.status.ok());
     std::filesystem::resize_file(world, text.size());
     return ran.status.error().code;

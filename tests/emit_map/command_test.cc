@@ -23,19 +23,14 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::Pair;
 
-class EmitMapCommandTest : public testing::Test {
+class EmitMapCommandTest : public CommandTest {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "emit_map_command_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
     Write({});
     ASSERT_TRUE(WriteDecomposition(example_.decomposition, Path("regions.db")).ok());
     ASSERT_TRUE(WriteVocabulary(example_.vocabulary, Path("vocabulary.db")).ok());
     ASSERT_TRUE(WriteAppearance(example_.appearance, Path("appearance.db")).ok());
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
   // classes.db and world.db, with what the stages before dropped.
   void Write(const std::vector<DroppedItem>& of_classes,
              const std::vector<DroppedItem>& of_world = {}) const {
@@ -44,11 +39,11 @@ class EmitMapCommandTest : public testing::Test {
   }
   // emit-map --classes classes.db ... --name hall -o hall.cairn WORDS...
   Ran Run(const std::vector<std::string>& more, int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {"--classes",    Path("classes.db"),    "--world", Path("world.db"),
-                                      "--regions",    Path("regions.db"),    "--name",  "hall",
-                                      "--vocabulary", Path("vocabulary.db"), "-o",      Path("hall.cairn")};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(EmitMapCommand(), words, memory_mib);
+    return RunWords(
+        EmitMapCommand(),
+        {"--classes", Path("classes.db"), "--world", Path("world.db"), "--regions", Path("regions.db"),
+         "--name", "hall", "--vocabulary", Path("vocabulary.db"), "-o", Path("hall.cairn")},
+        more, memory_mib);
   }
   MapRows Rows() const {
     const Result<MapRows> rows = ReadMapRows(Path("hall.cairn"));
@@ -57,7 +52,6 @@ class EmitMapCommandTest : public testing::Test {
   }
 
   const EmitExample example_ = MakeEmitExample();
-  std::filesystem::path folder_;
 };
 
 TEST_F(EmitMapCommandTest, SaysWhatIsInTheMap) {

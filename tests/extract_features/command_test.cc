@@ -22,9 +22,7 @@ class ExtractFeaturesCommandTest : public ExtractFeaturesTest {
  protected:
   // extract-features CAPTURE -o features.db WORDS...
   Ran Run(const std::vector<std::string>& more, int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {root_, "-o", root_ + "/features.db"};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(ExtractFeaturesCommand(), words, memory_mib);
+    return RunWords(ExtractFeaturesCommand(), {root_, "-o", root_ + "/features.db"}, more, memory_mib);
   }
 };
 

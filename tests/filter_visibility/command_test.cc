@@ -38,24 +38,13 @@ Classes SquareSurvey(int side) {
   return classes;
 }
 
-class FilterVisibilityCommandTest : public testing::Test {
+class FilterVisibilityCommandTest : public CommandTest {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "filter_visibility_command_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
   // filter-visibility classes.db -o OUTPUT WORDS...
   Ran Run(const std::string& output, const std::vector<std::string>& more,
           int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {Path("classes.db"), "-o", Path(output)};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(FilterVisibilityCommand(), words, memory_mib);
+    return RunWords(FilterVisibilityCommand(), {Path("classes.db"), "-o", Path(output)}, more, memory_mib);
   }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(FilterVisibilityCommandTest, SaysHowManyClassesStayAndWhyOthersDoNot) {

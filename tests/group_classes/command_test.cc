@@ -19,15 +19,9 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::Pair;
 
-class GroupClassesCommandTest : public testing::Test {
+class GroupClassesCommandTest : public CommandTest {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "group_classes_command_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_ / "capture/images");
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
+  void SetUp() override { std::filesystem::create_directories(folder_ / "capture/images"); }
 
   void Write(const Survey& survey) const {
     WriteMatches(survey.matched, Path("matches.db"));
@@ -41,10 +35,9 @@ class GroupClassesCommandTest : public testing::Test {
   }
   // group-classes matches.db --capture CAPTURE -o classes.db WORDS...
   Ran Run(const std::vector<std::string>& more, int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {Path("matches.db"), "--capture", Path("capture"), "-o",
-                                      Path("classes.db")};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(GroupClassesCommand(), words, memory_mib);
+    return RunWords(GroupClassesCommand(),
+                    {Path("matches.db"), "--capture", Path("capture"), "-o", Path("classes.db")}, more,
+                    memory_mib);
   }
   // What the function says of the files that the command was given.
   GroupClassesResult Grouped(const GroupClassesOptions& options,
@@ -61,8 +54,6 @@ class GroupClassesCommandTest : public testing::Test {
   void Enlarge(int64_t size_mib) const {
     std::filesystem::resize_file(Path("matches.db"), static_cast<uintmax_t>(size_mib) << 20);
   }
-
-  std::filesystem::path folder_;
 };
 
 std::string KeptText(const GroupClassesResult& result) {

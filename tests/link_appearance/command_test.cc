@@ -21,15 +21,8 @@ using testing::Not;
 using testing::Pair;
 using testing::StartsWith;
 
-class LinkAppearanceCommandTest : public testing::Test {
+class LinkAppearanceCommandTest : public CommandTest {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "link_appearance_command_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
   void Write(const AppearanceGraph& graph) const {
     WriteMatches(Path("matches.db"), ImagesOf(graph), TwoViewConfig::kCalibrated);
   }
@@ -49,18 +42,13 @@ class LinkAppearanceCommandTest : public testing::Test {
   }
   // link-appearance matches.db -o appearance.db WORDS...
   Ran Link(const std::vector<std::string>& more, int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {Path("matches.db"), "-o", Path("appearance.db")};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(LinkAppearanceCommand(), words, memory_mib);
+    return RunWords(LinkAppearanceCommand(), {Path("matches.db"), "-o", Path("appearance.db")}, more,
+                    memory_mib);
   }
   // check-appearance matches.db --num-tries 0 WORDS...
   Ran Check(const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {Path("matches.db"), "--num-tries", "0"};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(CheckAppearanceCommand(), words);
+    return RunWords(CheckAppearanceCommand(), {Path("matches.db"), "--num-tries", "0"}, more);
   }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(LinkAppearanceCommandTest, SaysHowManyNodesItKeepsOfHowMany) {

@@ -22,9 +22,7 @@ class MatchFeaturesCommandTest : public MatchFeaturesTest {
   // match-features features.db -o OUTPUT WORDS...
   Ran Run(const std::string& output, const std::vector<std::string>& more,
           int64_t memory_mib = 1 << 20) const {
-    std::vector<std::string> words = {Path("features.db"), "-o", Path(output)};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(MatchFeaturesCommand(), words, memory_mib);
+    return RunWords(MatchFeaturesCommand(), {Path("features.db"), "-o", Path(output)}, more, memory_mib);
   }
 };
 

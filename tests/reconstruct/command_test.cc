@@ -28,11 +28,9 @@ using testing::StartsWith;
 namespace fs = std::filesystem;
 
 // A capture of ten images without files, in a database with their matches.
-class ReconstructCommandTest : public testing::Test {
+class ReconstructCommandTest : public CommandTest {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "reconstruct_command_test";
-    fs::remove_all(folder_);
     fs::create_directories(folder_ / "capture");
     const Status status =
         WriteDatabase(Path("matches.db"), kColmapSchema, [&](SQLite::Database& database) -> Status {
@@ -52,9 +50,6 @@ class ReconstructCommandTest : public testing::Test {
     ASSERT_TRUE(status.ok()) << status.error().message;
     fs::copy_file(Path("matches.db"), Path("capture/features.db"));
   }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string Path(const std::string& name) const { return folder_ / name; }
-
   // Every image's true place; that of the fourth is ten metres too high.
   void WriteControlPoints() const {
     std::ofstream file(Path("capture/points.txt"));
@@ -66,10 +61,9 @@ class ReconstructCommandTest : public testing::Test {
   }
   // reconstruct matches.db --capture CAPTURE -o poses WORDS...
   Ran Run(const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {Path("matches.db"), "--capture", Path("capture"), "-o",
-                                      Path("poses"),      "--mapper",  "global"};
-    words.insert(words.end(), more.begin(), more.end());
-    return RunWords(ReconstructCommand(), words);
+    return RunWords(
+        ReconstructCommand(),
+        {Path("matches.db"), "--capture", Path("capture"), "-o", Path("poses"), "--mapper", "global"}, more);
   }
   ReconstructResult Reconstructed(ReconstructOptions options) const {
     options.mapper.mapper = "global";
@@ -82,7 +76,6 @@ class ReconstructCommandTest : public testing::Test {
   }
 
   const SyntheticSurvey survey_ = MakeSyntheticSurvey(10, 12);
-  fs::path folder_;
 };
 
 TEST_F(ReconstructCommandTest, SaysWhatWasRegisteredAndHowWellItFitsWhatIsKnown) {

@@ -7,14 +7,10 @@
 
 #include <opencv2/calib3d.hpp>
 
-#include "core/base/random.h"
+#include "tests/core/geometry/random_vector.h"
 
 namespace cairn {
 namespace {
-
-Eigen::Vector3d RandomVector(Random& random, double extent) {
-  return {random.Uniform(-extent, extent), random.Uniform(-extent, extent), random.Uniform(-extent, extent)};
-}
 
 Pose RandomPose(Random& random) {
   const Eigen::Vector3d axis = RandomVector(random, 1).normalized();

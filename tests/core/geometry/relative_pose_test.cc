@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/SVD>
 
+#include "tests/core/geometry/random_vector.h"
 #include "tests/core/geometry/seen_by_two.h"
 
 namespace cairn {
@@ -56,14 +57,10 @@ TEST(RefineRelativePose, FindsThePoseFromNearby) {
 
 TEST(RefineRelativePose, FindsItOfBearingsAllAround) {
   Random random(9);
-  const auto vector = [&] {
-    const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
-    return Eigen::Vector3d(x, y, random.Uniform(-1, 1));
-  };
   Pose truth = SeePoints(1, 0).cam2_from_cam1;
   Correspondences c;
   for (int i = 0; i < 60; ++i) {
-    const Eigen::Vector3d point = 4 * vector();
+    const Eigen::Vector3d point = 4 * RandomVector(random, 1);
     c.Add(point.normalized(), (truth * point).normalized(), i);
   }
   const Pose start = Turned(truth, {0.02, -0.03, 0.01}, {0.05, 0.02, -0.04});
@@ -122,16 +119,12 @@ TEST(PoseFromEssentialMatrix, PutsMostPointsInFrontOfBothCameras) {
   Random random(6);
   for (int trial = 0; trial < 50; ++trial) {
     Pose truth;
-    const auto vector = [&] {
-      const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
-      return Eigen::Vector3d(x, y, random.Uniform(-1, 1));
-    };
-    truth.rotation = Eigen::AngleAxisd(random.Uniform(0, 0.5), vector().normalized());
-    truth.translation = vector().normalized();
+    truth.rotation = Eigen::AngleAxisd(random.Uniform(0, 0.5), RandomVector(random, 1).normalized());
+    truth.translation = RandomVector(random, 1).normalized();
     Correspondences c;
     while (c.size() < 30) {
       // Bearings of rays whose points lie in front; of the last ten, behind both.
-      const Eigen::Vector3d point = 4 * vector();
+      const Eigen::Vector3d point = 4 * RandomVector(random, 1);
       const double sign = c.size() < 20 ? 1 : -1;
       c.Add(sign * point.normalized(), sign * (truth * point).normalized(), c.size());
     }
@@ -146,14 +139,10 @@ TEST(PoseFromEssentialMatrix, PutsMostPointsInFrontOfBothCameras) {
 TEST(PoseFromEssentialMatrix, OnePointTellsTheFourPosesApart) {
   Random random(8);
   for (int trial = 0; trial < 200; ++trial) {
-    const auto vector = [&] {
-      const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
-      return Eigen::Vector3d(x, y, random.Uniform(-1, 1));
-    };
     Pose truth;
-    truth.rotation = Eigen::AngleAxisd(random.Uniform(0, 3), vector().normalized());
-    truth.translation = vector().normalized();
-    const Eigen::Vector3d point = 4 * vector();
+    truth.rotation = Eigen::AngleAxisd(random.Uniform(0, 3), RandomVector(random, 1).normalized());
+    truth.translation = RandomVector(random, 1).normalized();
+    const Eigen::Vector3d point = 4 * RandomVector(random, 1);
     Correspondences c;
     c.Add(point.normalized(), (truth * point).normalized(), 0);
     EXPECT_LT(OffBy(PoseFromEssentialMatrix(EssentialMatrix(truth), c), truth), 1e-6) << trial;
