@@ -17,30 +17,45 @@ std::string_view BlobView(const SQLite::Column& column) {
 
 Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t num_nodes,
                  Vocabulary* vocabulary) {
-  std::vector<std::pair<int64_t, std::string>> rows;
-  vocabulary->nodes.resize(num_nodes);
+  struct Row {
+    int64_t node_id;
+    int64_t num_children;
+    std::string centres;
+  };
+  std::vector<Row> rows;
   const int num_values = vocabulary->kind.num_values;
   SQLite::Statement query(database,
                           "SELECT node_id, num_children, centres FROM vocabulary_nodes ORDER BY node_id");
+  int64_t next_id = 0, num_counted = std::min<int64_t>(num_nodes, 1);  // with the root
   while (query.executeStep()) {
     const int64_t node_id = query.getColumn(0).getInt64();
     const int64_t num_children = query.getColumn(1).getInt64();
     const std::string_view centres = BlobView(query.getColumn(2));
-    if (node_id < 0 || node_id >= num_nodes || num_children < 1 || num_children > num_nodes ||
+    if (node_id < next_id || node_id >= num_nodes || num_children < 1 ||
+        num_children > num_nodes - num_counted ||
         static_cast<int64_t>(centres.size()) != num_children * num_values) {
       return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_nodes {}: {} children with {} bytes of centres",
                        path, node_id, num_children, centres.size());
     }
-    vocabulary->nodes[node_id].num_children = static_cast<int32_t>(num_children);
-    rows.emplace_back(node_id, centres);
+    next_id = node_id + 1;
+    num_counted += num_children;
+    rows.push_back({node_id, num_children, std::string(centres)});
   }
+  // Nothing of a size that the file only claims is allocated.
+  if (num_counted != num_nodes) {
+    return MakeError(ErrorCode::kCorrupt, "{}: vocabulary of {} nodes, found {}", path, num_nodes,
+                     num_counted);
+  }
+  vocabulary->nodes.resize(num_nodes);
+  for (const Row& row : rows)
+    vocabulary->nodes[row.node_id].num_children = static_cast<int32_t>(row.num_children);
   if (Status status = NumberVocabularyNodes(vocabulary); !status.ok()) {
     return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);
   }
   vocabulary->centres = DescriptorMatrix::Zero(num_nodes, num_values);
-  for (const auto& [node_id, centres] : rows) {
-    std::memcpy(vocabulary->centres.row(vocabulary->nodes[node_id].first_child).data(), centres.data(),
-                centres.size());
+  for (const Row& row : rows) {
+    std::memcpy(vocabulary->centres.row(vocabulary->nodes[row.node_id].first_child).data(),
+                row.centres.data(), row.centres.size());
   }
   return Ok();
 }
@@ -49,6 +64,7 @@ Status ReadWords(SQLite::Database& database, const std::string& path, int64_t nu
                  Vocabulary* vocabulary) {
   SQLite::Statement query(database,
                           "SELECT word_id, num_postings, postings FROM vocabulary_words ORDER BY word_id");
+  int64_t next_word = 0;
   while (query.executeStep()) {
     const int64_t word = query.getColumn(0).getInt64();
     const int64_t num_postings = query.getColumn(1).getInt64();
@@ -57,10 +73,11 @@ Status ReadWords(SQLite::Database& database, const std::string& path, int64_t nu
                                     "{}: vocabulary_words {}: {} postings in {} bytes are not "
                                     "ascending documents below {} with counts",
                                     path, word, num_postings, bytes.size(), num_documents);
-    if (word < 0 || word >= vocabulary->num_words() || num_postings < 1 ||
+    if (word < next_word || word >= vocabulary->num_words() || num_postings < 1 ||
         num_postings > static_cast<int64_t>(bytes.size()) / 2) {
       return corrupt;
     }
+    next_word = word + 1;
     BlobReader reader(bytes);
     int64_t document = -1;
     for (int64_t i = 0; i < num_postings; ++i) {

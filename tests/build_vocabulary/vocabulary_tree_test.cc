@@ -151,28 +151,95 @@ TEST(VocabularyTree, FileRoundTripKeepsEverything) {
   EXPECT_EQ(read->depth, 2);
 }
 
-TEST(VocabularyTree, DamagedTablesAreRefused) {
+// What reading HandMadeTree says after `sql` was done to its file.
+Result<Vocabulary> ReadAfter(const std::string& sql) {
   const std::string path = testing::TempDir() + "/damaged.db";
-  const auto damage = [&](const std::string& sql) {
-    EXPECT_TRUE(WriteVocabulary(HandMadeTree(), path).ok());
-    SQLite::Database(path, SQLite::OPEN_READWRITE).exec(sql);
-    const Result<Vocabulary> read = ReadVocabulary(path);
-    ASSERT_FALSE(read.ok()) << sql;
-    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
-    EXPECT_THAT(read.error().message, testing::HasSubstr(path)) << sql;
+  EXPECT_TRUE(WriteVocabulary(HandMadeTree(), path).ok());
+  SQLite::Database(path, SQLite::OPEN_READWRITE).exec(sql);
+  return ReadVocabulary(path);
+}
+
+void ExpectCorrupt(const std::string& sql, const std::string& message) {
+  SCOPED_TRACE(sql);
+  const Result<Vocabulary> read = ReadAfter(sql);
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(read.error().message, testing::HasSubstr("damaged.db"));
+  EXPECT_THAT(read.error().message, testing::HasSubstr(message));
+}
+
+// A table of the same rows, and of `more`, that keeps none of the schema's promises.
+std::string WithoutKey(const std::string& table, const std::string& more) {
+  return "CREATE TABLE plain AS SELECT * FROM " + table + "; DROP TABLE " + table +
+         "; ALTER TABLE plain RENAME TO " + table + "; INSERT INTO " + table + " " + more;
+}
+
+TEST(VocabularyTree, DamagedNodesAreRefused) {
+  const auto nodes = [](const std::string& sql) { return "UPDATE vocabulary_nodes SET " + sql; };
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = -1", "vocabulary of -1 nodes");
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = 0", "vocabulary_nodes 0: 2 children");
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = 4", "vocabulary_nodes 1: 2 children with 256 bytes");
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = 6", "vocabulary of 6 nodes, found 5");
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = 100000000", "vocabulary of 100000000 nodes, found 5");
+  ExpectCorrupt("UPDATE vocabulary SET num_nodes = 100000001", "vocabulary of 100000001 nodes");
+  ExpectCorrupt("DELETE FROM vocabulary_nodes", "vocabulary of 5 nodes, found 1");
+  ExpectCorrupt(nodes("node_id = -1 WHERE node_id = 0"), "vocabulary_nodes -1: 2 children");
+  ExpectCorrupt(nodes("node_id = 5 WHERE node_id = 1"), "vocabulary_nodes 5: 2 children");
+  ExpectCorrupt(nodes("node_id = 4 WHERE node_id = 1"), "node 4: 2 children do not fit 5 nodes");
+  ExpectCorrupt(nodes("num_children = 0 WHERE node_id = 1"), "vocabulary_nodes 1: 0 children");
+  ExpectCorrupt(nodes("num_children = 3, centres = zeroblob(384) WHERE node_id = 1"),
+                "vocabulary_nodes 1: 3 children with 384 bytes");
+  ExpectCorrupt(nodes("num_children = 3 WHERE node_id = 0"), "vocabulary_nodes 0: 3 children with 256 bytes");
+  ExpectCorrupt(nodes("centres = zeroblob(257) WHERE node_id = 1"), "2 children with 257 bytes");
+  // The second row of a node would have other children in the place of the first one's.
+  ExpectCorrupt(
+      WithoutKey("vocabulary_nodes", "VALUES (0, 1, zeroblob(128))") +
+          "; UPDATE vocabulary_nodes SET num_children = 1, centres = zeroblob(128) WHERE node_id = 1",
+      "vocabulary_nodes 0: ");
+}
+
+TEST(VocabularyTree, DamagedWordsAreRefused) {
+  const auto word_1 = [](const std::string& sql) {
+    return "UPDATE vocabulary_words SET " + sql + " WHERE word_id = 1";
   };
-  damage("UPDATE vocabulary SET num_nodes = 1000000000000");
-  damage("UPDATE vocabulary SET num_nodes = 4");
-  damage("UPDATE vocabulary_nodes SET num_children = 3 WHERE node_id = 0");
-  damage("UPDATE vocabulary_nodes SET centres = x'00' WHERE node_id = 1");
-  damage("UPDATE vocabulary_nodes SET node_id = 4 WHERE node_id = 1");
-  damage("UPDATE vocabulary_words SET postings = x'0505' WHERE word_id = 1");
-  damage("UPDATE vocabulary_words SET postings = x'ffffffffffffffffffffff' WHERE word_id = 1");
-  damage("UPDATE vocabulary_words SET num_postings = 1000000000 WHERE word_id = 1");
-  damage("UPDATE vocabulary_words SET word_id = 77 WHERE word_id = 1");
-  damage("UPDATE vocabulary_documents SET image_id = 1 WHERE document_idx = 1");
-  damage("DELETE FROM vocabulary");
-  damage("DROP TABLE vocabulary");
+  const std::string refused = "are not ascending documents below 2 with counts";
+  // As it is: one posting, the document -1 + 1, twice.
+  ExpectCorrupt(word_1("postings = x'0505'"), "vocabulary_words 1: 1 postings in 2 bytes " + refused);
+  for (const char* postings : {"x'0002'", "x'0302'", "x'0100'", "x''", "x'01'", "x'010201'",
+                               "x'ffffffffffffffffffffff'", "x'018080808008'", "'words'"}) {
+    ExpectCorrupt(word_1(std::string("postings = ") + postings), refused);
+  }
+  ExpectCorrupt(word_1("num_postings = 2, postings = x'01020201'"), refused);  // the documents 0 and 2
+  ExpectCorrupt(word_1("num_postings = 2"), refused);
+  ExpectCorrupt(word_1("num_postings = 0, postings = x''"), refused);
+  ExpectCorrupt(word_1("num_postings = 1000000000"), refused);
+  ExpectCorrupt(word_1("word_id = -1"), "vocabulary_words -1: ");
+  ExpectCorrupt(word_1("word_id = 3"), "vocabulary_words 3: ");
+  ExpectCorrupt(WithoutKey("vocabulary_words", "VALUES (1, 1, x'0101')"), "vocabulary_words 1: ");
+
+  const Result<Vocabulary> most = ReadAfter(word_1("num_postings = 2, postings = x'010101ffffffff07'"));
+  ASSERT_TRUE(most.ok()) << most.error().message;
+  EXPECT_THAT(most->inverted_files[1], testing::ElementsAre(Posting{0, 1}, Posting{1, INT32_MAX}));
+  const Result<Vocabulary> last = ReadAfter(word_1("postings = x'0202'"));
+  ASSERT_TRUE(last.ok()) << last.error().message;
+  EXPECT_THAT(last->inverted_files[1], testing::ElementsAre(Posting{1, 2}));
+}
+
+TEST(VocabularyTree, DamagedDocumentsAreRefused) {
+  const auto second = [](const std::string& sql) {
+    return "UPDATE vocabulary_documents SET " + sql + " WHERE document_idx = 1";
+  };
+  ExpectCorrupt(second("image_id = 1"), "vocabulary_documents 1: image 1 is out of order");
+  ExpectCorrupt(second("image_id = 5"), "vocabulary_documents 1: image 5 is out of order");
+  ExpectCorrupt(second("image_id = 4294967295"), "image 4294967295 is out of order");
+  ExpectCorrupt(second("document_idx = 2"), "vocabulary_documents 2: ");
+  ExpectCorrupt("UPDATE vocabulary_documents SET image_id = -1 WHERE document_idx = 0",
+                "image -1 is out of order");
+  ExpectCorrupt("UPDATE vocabulary SET num_words = 2", "states 2 words and 2 documents, found 3 and 2");
+  ExpectCorrupt("UPDATE vocabulary SET num_documents = 3", "states 3 words and 3 documents, found 3 and 2");
+  ExpectCorrupt("DELETE FROM vocabulary", "table 'vocabulary' is empty");
+  ExpectCorrupt("DROP TABLE vocabulary", "has no table 'vocabulary'");
+  EXPECT_TRUE(ReadAfter(second("image_id = 4294967294")).ok());
 }
 
 }  // namespace

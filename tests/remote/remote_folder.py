@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Shows a folder at another place as a slow file server would: every call takes a while, files cannot be mapped to be written, and there
-may be no locks.  One call may fail, or be done and reported as failed, as a request that is sent twice is.
+"""Shows a folder at another place as a slow file server would: every call takes a while, files cannot be mapped to be written, there
+may be no locks, and a file's size and times are asked for again after a second.  One call may fail, or be done and reported as failed,
+as a request that is sent twice is.
 
   remote_folder.py FOLDER PLACE [--delay-ms MS] [--no-locks] [--fail KIND:NUMBER:ERRNO] [--lost KIND:NUMBER:ERRNO] [--counts FILE]
 
@@ -145,7 +146,7 @@ def main():
     parser.add_argument("--counts", default="")
     arguments = parser.parse_args()
     fusepy.FUSE(RemoteFolder(arguments.folder, arguments), arguments.place, foreground=True, direct_io=True, big_writes=True,
-                hard_remove=True, use_ino=True, attr_timeout=0, entry_timeout=0)
+                hard_remove=True, use_ino=True, attr_timeout=1, entry_timeout=1)
 
 
 if __name__ == "__main__":
