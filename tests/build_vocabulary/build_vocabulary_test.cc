@@ -12,6 +12,7 @@
 #include "core/base/random.h"
 #include "core/files/file.h"
 #include "core/vocabulary/split_node.h"
+#include "tests/recorded_progress.h"
 
 namespace cairn::build_vocabulary {
 namespace {
@@ -93,6 +94,18 @@ TEST(BuildVocabulary, SplitOfSomeRowsIsThatOfThemAlone) {
       EXPECT_EQ(of_some[i].members[k], 2 * alone[i].members[k] + 1);
     }
   }
+}
+
+TEST(BuildVocabulary, TellsHowFarItIs) {
+  BuildVocabularyOptions options;
+  options.tree.depth = 2;
+  options.tree.min_num_descriptors_to_split = 2;
+  RecordedProgress progress;
+  ASSERT_TRUE(BuildVocabulary(RandomImages(5, 100, 2), {}, options, 7, 2, progress).ok());
+  progress.ExpectAllDone();
+  ASSERT_GE(progress.tasks.size(), 2u);
+  EXPECT_EQ(progress.tasks[1].name, "training vocabulary");
+  EXPECT_EQ(progress.tasks[1].total, 2 * 500);  // each level has all
 }
 
 TEST(BuildVocabulary, SeedChangesTheTree) {

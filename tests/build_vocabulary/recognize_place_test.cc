@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "tests/option_limits.h"
 
 namespace cairn::build_vocabulary {
 namespace {
@@ -45,6 +46,20 @@ TEST(RecognizePlace, CountsDocumentsThatShareAsMuchByChance) {
   EXPECT_NEAR(chance({4, 6}, 0), std::log10(4.0), 1e-9);
   EXPECT_NEAR(chance({}, 0), std::log10(4.0), 1e-9);
   EXPECT_NEAR(chance({8, 8}, 0), std::log10(4.0), 1e-9);
+}
+
+TEST(RecognizePlace, WordsOfAllDocumentsAndDocumentsWithoutWordsSayNothing) {
+  // Word 0 is in all three documents that have words, words 1 to 3 in one each.
+  Vocabulary vocabulary;
+  vocabulary.document_ids = {1, 2, 3, 4};
+  vocabulary.inverted_files = {{{0, 1}, {1, 1}, {2, 1}, {3, 1}}, {{0, 1}}, {{1, 1}}, {{2, 1}}};
+  WeightVocabulary(&vocabulary);
+  // One word shared of one that counts: the document has 2 of 7 / 4 words, so p = 1 - (3/4)^(8/7).
+  EXPECT_NEAR(Log10NumDocumentsByChance(vocabulary, CountWords({0, 1}), 0),
+              std::log10(4 * (1 - std::pow(0.75, 8.0 / 7))), 1e-9);
+  vocabulary.inverted_files[0].pop_back();
+  WeightVocabulary(&vocabulary);
+  EXPECT_NEAR(Log10NumDocumentsByChance(vocabulary, CountWords({0, 1}), 3), std::log10(4.0), 1e-9);
 }
 
 TEST(RecognizePlace, NeverPromisesLessThanChanceGives) {
@@ -109,9 +124,12 @@ TEST(RecognizePlace, RefusesOneWordHoweverRare) {
 TEST(RecognizePlace, RefusesBlankImagesAndFewWords) {
   EXPECT_FALSE(RecognizePlace(FourPlaces(), {}, Options(1, 9)));
   EXPECT_FALSE(RecognizePlace(FourPlaces(), {4, 5}, Options(3, 9)));
+  EXPECT_TRUE(RecognizePlace(FourPlaces(), {4, 5}, Options(2, 9)));
   EXPECT_FALSE(RecognizePlace(FourPlaces(), {4, 8, 8, 8}, Options(2, 9)));  // word 8 says nothing
   EXPECT_FALSE(RecognizePlace(Vocabulary(), {}, Options(1, 9)));
 }
+
+TEST(RecognizePlace, OptionsHaveLimits) { ExpectLimits<PlaceOptions>({{"min_num_words", "1", "0"}}); }
 
 TEST(RecognizePlace, HoldsForAMillionDocuments) {
   // Words in one of a million documents each, worth 13.8: e^(64 * 13.8) is no double.  Two are shared.

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "core/base/random.h"
+#include "tests/option_limits.h"
 
 namespace cairn::build_vocabulary {
 namespace {
@@ -157,6 +158,16 @@ TEST(RerankPlaces, TakesBlankImagesAndUndefinedBearings) {
   RerankOptions bad;
   bad.min_num_inliers = 5;
   EXPECT_EQ(RerankPlaces(blank, {}, bad, 1).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(RerankPlaces, OptionsHaveLimits) {
+  ExpectLimits<RerankOptions>({{"num_candidates", "0", "-1"},
+                               {"max_ratio", "0.001", "0.0009", "1", "1.001"},
+                               {"max_angle_rad", "0.001", "0.0009"},
+                               {"max_epipolar_error_px", "0.001", "0.0009"},
+                               {"min_num_inliers", "6", "5"},
+                               {"baseline_ratio", "0.001", "0.0009"},
+                               {"max_num_samples", "1", "0"}});
 }
 
 }  // namespace

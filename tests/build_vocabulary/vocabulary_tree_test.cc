@@ -55,6 +55,23 @@ DescriptorMatrix Unit(int dimension) {
   return descriptor;
 }
 
+TEST(VocabularyTree, ChildrenThatDoNotFitTheNodesAreAnError) {
+  const auto said = [](const std::vector<int32_t>& num_children) {
+    Vocabulary tree;
+    for (const int32_t num : num_children) tree.nodes.push_back({.num_children = num});
+    const Status status = NumberVocabularyNodes(&tree);
+    return status.ok() ? "" : status.error().message;
+  };
+  EXPECT_EQ(said({}), "");
+  EXPECT_EQ(said({0}), "");
+  EXPECT_EQ(said({3, 0, 1, 0, 0}), "");
+  EXPECT_EQ(said({1}), "vocabulary node 0: 1 children do not fit 1 nodes");
+  EXPECT_EQ(said({2, 0}), "vocabulary node 0: 2 children do not fit 2 nodes");
+  EXPECT_EQ(said({-1, 0}), "vocabulary node 0: -1 children do not fit 2 nodes");
+  EXPECT_EQ(said({1, 0, 1, 0}), "vocabulary node 2: 1 children do not fit 4 nodes");  // before its children
+  EXPECT_EQ(said({1, 0, 0}), "vocabulary: 3 nodes, but children for 2");
+}
+
 TEST(VocabularyTree, DescriptorFallsToTheNearestLeaf) {
   const Vocabulary tree = HandMadeTree();
   EXPECT_EQ(QuantizeDescriptor(tree, Unit(0).data()), 1);
@@ -76,6 +93,8 @@ TEST(VocabularyTree, ScoresByHand) {
   EXPECT_NEAR(scored[0].score, std::sqrt(0.5), 1e-6);
   EXPECT_NEAR(scored[1].score, std::sqrt(0.5), 1e-6);
   EXPECT_EQ(QueryVocabulary(tree, query, 1).size(), 1u);
+  EXPECT_TRUE(QueryVocabulary(tree, query, 0).empty());
+  EXPECT_TRUE(QueryVocabulary(tree, query, -1).empty());
   EXPECT_NEAR(QueryVocabulary(tree, Unit(1), 10)[0].score, 1, 1e-6);
   EXPECT_TRUE(QueryVocabulary(tree, Unit(2), 10).empty());  // only word 0, which weighs nothing
 }
@@ -140,7 +159,8 @@ TEST(VocabularyTree, ImageOfTheSurveyFindsItself) {
 
 TEST(VocabularyTree, FileRoundTripKeepsEverything) {
   const std::string path = testing::TempDir() + "/round_trip.db";
-  const Vocabulary written = HandMadeTree();
+  Vocabulary written = HandMadeTree();
+  written.depth = 3;  // not reached everywhere
   ASSERT_TRUE(WriteVocabulary(written, path).ok());
   const Result<Vocabulary> read = ReadVocabulary(path);
   ASSERT_TRUE(read.ok()) << read.error().message;
@@ -148,7 +168,8 @@ TEST(VocabularyTree, FileRoundTripKeepsEverything) {
   EXPECT_EQ(read->inverted_files, written.inverted_files);
   EXPECT_EQ(read->document_ids, written.document_ids);
   EXPECT_EQ(read->idf, written.idf);
-  EXPECT_EQ(read->depth, 2);
+  EXPECT_EQ(read->branching, 2);
+  EXPECT_EQ(read->depth, 3);
 }
 
 // What reading HandMadeTree says after `sql` was done to its file.

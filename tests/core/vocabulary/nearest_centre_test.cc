@@ -34,6 +34,30 @@ TEST(NearestCentre, HasTheLargestDotProductForAnyNumberOfCentres) {
   }
 }
 
+TEST(NearestCentre, OfValuesAroundAnOffsetHasTheLargestDotProductOfTheDifferences) {
+  Random random(4);
+  for (const DescriptorSpace& space : {DescriptorSpace{.num_values = 33}, DescriptorSpace{.num_values = 256},
+                                       DescriptorSpace{.num_values = 128, .offset = 128},
+                                       DescriptorSpace{.num_values = 64, .offset = 100}}) {
+    for (int num_centres = 1; num_centres <= 9; ++num_centres) {
+      std::vector<uint8_t> centres(num_centres * space.num_values), descriptor(space.num_values);
+      for (uint8_t& value : centres) value = static_cast<uint8_t>(random.UniformInt(0, 255));
+      for (uint8_t& value : descriptor) value = static_cast<uint8_t>(random.UniformInt(0, 255));
+      // Of centres of one norm the nearest is that of the largest dot product; the
+      // centre's own offset adds the same to all.
+      int expected = 0;
+      int64_t largest = INT64_MIN;
+      for (int i = 0; i < num_centres; ++i) {
+        int64_t dot = 0;
+        for (int d = 0; d < space.num_values; ++d)
+          dot += (centres[i * space.num_values + d] - space.offset) * (descriptor[d] - space.offset);
+        if (dot > largest) largest = dot, expected = i;
+      }
+      EXPECT_EQ(NearestCentre(centres.data(), num_centres, descriptor.data(), space), expected);
+    }
+  }
+}
+
 TEST(NearestCentre, EqualCentresGiveTheFirst) {
   const DescriptorMatrix centres = DescriptorMatrix::Constant(9, kSiftDescriptorDim, 255);
   EXPECT_EQ(NearestCentre(centres.data(), 9, centres.data()), 0);
