@@ -139,7 +139,7 @@ void SchurSystem::OrderSlots() {
   for (size_t p = 0; p < num_points; ++p) {
     for (size_t s = slot_begin_[p]; s < slot_begin_[p + 1]; ++s)
       slot_position_[s] = cholesky_->position_of(slot_position_[s]);
-    std::sort(&slot_position_[slot_begin_[p]], slot_position_.data() + slot_begin_[p + 1]);
+    std::sort(slot_position_.data() + slot_begin_[p], slot_position_.data() + slot_begin_[p + 1]);
   }
   size_t num_projected = 0;
   for (const int position : slot_position_) {

@@ -42,7 +42,8 @@ TEST(Blob, AVarintOfMoreThanNineBytesOrCutOffIsNone) {
     EXPECT_FALSE(reader.ok());
     EXPECT_FALSE(reader.Finished());
   }
-  BlobReader reader(nine + "\x01");
+  const std::string whole = nine + "\x01";
+  BlobReader reader(whole);
   EXPECT_EQ(reader.Varint(), uint64_t{1} << 56);
   EXPECT_TRUE(reader.Finished());
 }
