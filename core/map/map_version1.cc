@@ -133,6 +133,10 @@ Result<MapRows> ReadTables(SQLite::Database& database, const std::string& path) 
   const auto num_bytes = static_cast<int64_t>(std::filesystem::file_size(path, error));
   const StepLimit steps(database, 100 * MaxStepsFor(num_bytes));
   CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path, 1));
+  for (const char* table : {"landmarks", "stations", "regions", "images", "vocabulary", "vocabulary_nodes",
+                            "vocabulary_words", "vocabulary_documents"}) {
+    CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, table));
+  }
   MapRows rows;
   CAIRN_ASSIGN_OR_RETURN(const StoredRows head, ReadStoredRows(database, path, HeadTables(), num_bytes));
   CAIRN_RETURN_IF_ERROR(DecodeMapHead(head, path, &rows));

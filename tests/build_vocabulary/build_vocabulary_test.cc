@@ -110,7 +110,8 @@ TEST(BuildVocabulary, TellsHowFarItIs) {
 
 TEST(BuildVocabulary, SeedChangesTheTree) {
   const auto images = RandomImages(4, 300, 1);
-  EXPECT_NE(Build(images, {}, 1, 1)->centres, Build(images, {}, 1, 2)->centres);
+  EXPECT_NE(FileBytes(*Build(images, {}, 1, 1), "seed_1.db"),
+            FileBytes(*Build(images, {}, 1, 2), "seed_2.db"));
 }
 
 TEST(BuildVocabulary, DepthFollowsTheNumberOfDescriptors) {
@@ -262,7 +263,7 @@ TEST(BuildVocabulary, TrainsWithDescriptorsDrawnFromAll) {
   options.max_num_training_descriptors = 280;
   EXPECT_EQ(Build(images, options)->centres, Build(images, {})->centres);
   options.max_num_training_descriptors = 279;
-  EXPECT_NE(Build(images, options)->centres, Build(images, {})->centres);
+  EXPECT_NE(FileBytes(*Build(images, options), "most.db"), FileBytes(*Build(images, {}), "all.db"));
 }
 
 TEST(BuildVocabulary, WhatASourceCannotReadIsItsError) {

@@ -174,6 +174,11 @@ TEST_F(ColmapDatabase, DamagedRowsAreNamed) {
   EXPECT_THAT(update("cameras", "height = 'tall'", "1"), HasSubstr("height is no integer"));
   EXPECT_THAT(update("images", "name = 'a.png'", "image_id = 2"),
               HasSubstr("table images, row 2: image 1 has the same name, 'a.png'"));
+  EXPECT_THAT(
+      MessageWith(
+          "CREATE TABLE plain AS SELECT * FROM images; DROP TABLE images; ALTER TABLE plain RENAME TO "
+          "images; UPDATE images SET image_id = 1"),  // a table without its key
+      HasSubstr("table images, row 1: another image has the same number"));
   EXPECT_THAT(update("images", "name = 'a' || char(10) || 'b.png'", "image_id = 2"),
               HasSubstr("has a control character"));
   EXPECT_THAT(update("images", "image_id = -3", "image_id = 2"),

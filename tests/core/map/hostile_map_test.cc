@@ -387,5 +387,20 @@ TEST_F(HostileMap, TablesWithoutEndOfAnOldMapAreRefused) {
   }
 }
 
+// A view of a few bytes has as many rows as its author likes.
+TEST_F(HostileMap, ViewsInThePlaceOfAnOldMapsTablesAreRefused) {
+  const std::string bytes = ReadFile(GOLDEN_DIR "/map_1.0.cairn").value();
+  for (const char* table : {"landmarks", "stations", "regions", "images", "vocabulary", "vocabulary_nodes",
+                            "vocabulary_words", "vocabulary_documents"}) {
+    WriteBytes(path_, bytes);
+    SQLite::Database(path_, SQLite::OPEN_READWRITE)
+        .exec(fmt::format("ALTER TABLE {0} RENAME TO kept; CREATE VIEW {0} AS SELECT * FROM kept", table));
+    const Result<MapRows> migrated = ReadMapRowsVersion1(path_);
+    ASSERT_FALSE(migrated.ok()) << table;
+    EXPECT_EQ(migrated.error().code, ErrorCode::kCorrupt) << table;
+    EXPECT_THAT(migrated.error().message, HasSubstr(fmt::format("has no plain table '{}'", table)));
+  }
+}
+
 }  // namespace
 }  // namespace cairn
