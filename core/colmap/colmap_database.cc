@@ -157,7 +157,7 @@ Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database
       row.Fail(fmt::format("the image's name, '{}', has a control character", image.name));
     const auto [named, is_new] = names.emplace(image.name, image.image_id);
     if (!is_new) row.Fail(fmt::format("image {} has the same name, '{}'", named->second, image.name));
-    if (!images.empty() && images.back().image_id == image.image_id)
+    if (!images.empty() && images.back().image_id >= image.image_id)
       row.Fail("another image has the same number");
     if (!row.ok()) return BadRow(database, "images", query.getColumn(0).getInt64(), row.problem());
     images.push_back(std::move(image));

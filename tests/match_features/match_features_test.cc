@@ -400,6 +400,25 @@ TEST_F(MatchFeaturesTest, DescriptorBlobOfWrongLengthNamesTheRow) {
               HasSubstr("table descriptors, row 2: blob of 2 bytes, expected 80 x 128"));
 }
 
+TEST_F(MatchFeaturesTest, ASecondRowOfAnImageIsAnError) {
+  WriteFeatures(3, [](SQLite::Database& database) {
+    for (const char* table : {"keypoints", "descriptors"}) {
+      database.exec(fmt::format(
+          "CREATE TABLE plain AS SELECT * FROM {0}; DROP TABLE {0}; ALTER TABLE plain RENAME TO {0}; INSERT "
+          "INTO {0} "
+          "SELECT image_id, 1, cols, substr(data, 1, length(data) / rows) FROM {0} WHERE rows > 1",
+          table));
+    }
+  });
+  for (const char* pairs : {"retrieval", "exhaustive"}) {
+    options_.pairs = pairs;
+    const auto summary = Match(true);
+    ASSERT_FALSE(summary.ok()) << pairs;
+    EXPECT_EQ(summary.error().code, ErrorCode::kCorrupt) << summary.error().message;
+    EXPECT_THAT(summary.error().message, HasSubstr("80")) << pairs;
+  }
+}
+
 TEST_F(MatchFeaturesTest, TruncatedDatabaseIsAnError) {
   WriteFeatures(3);
   const std::string bytes = *ReadFile(folder_ + "/features.db");

@@ -94,6 +94,13 @@ Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchI
   ImageFeatures features;
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id, kind));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
+  // A table without its key may have another row of the image that was counted.
+  const auto num_keypoints = static_cast<int64_t>(features.keypoints.size());
+  if (num_keypoints != image.num_features || features.descriptors.rows() != image.num_features) {
+    return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints and {} descriptors, expected {}",
+                     DatabasePath(database), image.name, num_keypoints, features.descriptors.rows(),
+                     image.num_features);
+  }
   features.packed = PackedDescriptors(features.descriptors, kind.space());
   features.bearings = BearingsOf(features.keypoints, camera);
   if (needed.index) features.index.emplace(features.descriptors, kind.space());

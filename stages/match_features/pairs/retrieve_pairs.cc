@@ -31,6 +31,10 @@ Result<DescriptorMatrix> SampleDescriptors(SQLite::Database& database, const Mat
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
     CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
                            ReadDatabaseDescriptors(database, image.image_id, images.descriptor_kind));
+    if (descriptors.rows() != image.num_features) {  // what the sample was sized by
+      return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} descriptors, and {} by its rows",
+                       DatabasePath(database), image.name, descriptors.rows(), image.num_features);
+    }
     for (int64_t i = (first + step - 1) / step * step; i < first + descriptors.rows(); i += step) {
       sample.row(i / step) = descriptors.row(i - first);
     }
