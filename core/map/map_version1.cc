@@ -104,13 +104,19 @@ Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRow
     if (landmark_idx != static_cast<int64_t>(rows->landmarks.size()) || landmark_idx >= num_landmarks) {
       return Corrupt(path, "landmark {} where {} was expected", landmark_idx, rows->landmarks.size());
     }
+    const int64_t class_id = query.getColumn(1).getInt64();
+    const int64_t num_observations = query.getColumn(6).getInt64();
+    if (class_id < 0 || class_id > UINT32_MAX || num_observations < 0 || num_observations > INT32_MAX) {
+      return Corrupt(path, "landmark {}: class {} or its {} observations out of range", landmark_idx,
+                     class_id, num_observations);
+    }
     MapLandmark landmark;
-    landmark.class_id = static_cast<ClassId>(query.getColumn(1).getInt64());
+    landmark.class_id = static_cast<ClassId>(class_id);
     for (int axis = 0; axis < 3; ++axis) {
       landmark.position[axis] = static_cast<double>(query.getColumn(2 + axis).getInt64()) * kMapLengthUnitM;
     }
     landmark.scale_m = static_cast<double>(query.getColumn(5).getInt64()) * kMapLengthUnitM;
-    landmark.num_observations = query.getColumn(6).getInt();
+    landmark.num_observations = static_cast<int32_t>(num_observations);
     BlobReader reader(BlobView(query.getColumn(7)));
     for (int row = 0; row < 3; ++row) {
       for (int col = row; col < 3; ++col)
