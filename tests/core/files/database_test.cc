@@ -143,6 +143,72 @@ TEST_F(HardenedDatabase, StatementsEndThatTakeMoreStepsThanTheFileCanNeed) {
   EXPECT_EQ(kept.execAndGet("SELECT count(*) FROM t a, t b").getInt(), 16'777'216);
 }
 
+// The steps that SQLite says a statement took, on a connection without a limit.
+int NumSteps(const std::string& path, const std::string& sql) {
+  SQLite::Database database = OpenImmutable(path);
+  sqlite3_stmt* statement = nullptr;
+  EXPECT_EQ(sqlite3_prepare_v2(database.getHandle(), sql.c_str(), -1, &statement, nullptr), SQLITE_OK);
+  while (sqlite3_step(statement) == SQLITE_ROW) {
+  }
+  const int num_steps = sqlite3_stmt_status(statement, SQLITE_STMTSTATUS_VM_STEP, 0);
+  sqlite3_finalize(statement);
+  return num_steps;
+}
+
+// 10 million, and 16 for each byte of the file: a longer file may take as many as a shorter one may not.
+TEST_F(HardenedDatabase, LongerFilesMayTakeMoreSteps) {
+  std::string sql = "CREATE TABLE t (x); INSERT INTO t VALUES (1)";
+  for (int i = 0; i < 11; ++i) sql += "; INSERT INTO t SELECT * FROM t";  // 2048 rows
+  const std::string query = "SELECT sum(a.x + b.x) FROM t a, t b";
+  for (const bool is_long : {false, true}) {
+    const std::string path =
+        Write(sql + (is_long ? "; CREATE TABLE p (x); INSERT INTO p VALUES (zeroblob(2000000))" : ""));
+    const auto most = static_cast<double>(10'000'000 + 16 * fs::file_size(path));
+    ASSERT_EQ(NumSteps(path, query) <= most, is_long) << NumSteps(path, query) << " steps of " << most;
+    const Status status = WithDatabaseErrors(path, [&]() -> Status {
+      SQLite::Database database = OpenDatabaseReadOnly(path).value();
+      EXPECT_EQ(database.execAndGet(query).getInt(), 2 * 2048 * 2048);
+      return Ok();
+    });
+    EXPECT_EQ(status.ok(), is_long);
+  }
+}
+
+// All statements of the connection together; what is left is looked at after each thousand steps.
+TEST_F(HardenedDatabase, StepLimitIsOfAllStatementsWhileItLives) {
+  std::string sql = "CREATE TABLE t (x); INSERT INTO t VALUES (1)";
+  for (int i = 0; i < 12; ++i) sql += "; INSERT INTO t SELECT * FROM t";
+  const std::string path = Write(sql);
+  const std::string query = "SELECT sum(x) FROM t";
+  const int num_steps = NumSteps(path, query);
+  ASSERT_GT(num_steps, 4096);
+  SQLite::Database database = OpenImmutable(path);
+  for (const int num_runs : {1, 4}) {
+    const StepLimit steps(database, num_runs * num_steps + 1000);
+    for (int run = 0; run < num_runs; ++run)
+      EXPECT_EQ(database.execAndGet(query).getInt(), 4096) << run << " of " << num_runs;
+    const Status status = WithDatabaseErrors(path, [&]() -> Status {
+      database.execAndGet(query);
+      return Ok();
+    });
+    ASSERT_FALSE(status.ok());
+    EXPECT_THAT(status.error().message, HasSubstr("shows more rows than a file of its size can hold"));
+  }
+  EXPECT_EQ(database.execAndGet("SELECT count(*) FROM t a, t b").getInt(), 16'777'216);
+}
+
+// A file with a hole in it may be as large as it likes: SQLite counts no further than to 2^31 - 1.
+TEST_F(HardenedDatabase, FilesOfAnySizeAreRead) {
+  std::string sql = "CREATE TABLE t (x); INSERT INTO t VALUES (1)";
+  for (int i = 0; i < 12; ++i) sql += "; INSERT INTO t SELECT * FROM t";
+  const std::string path = Write(sql);
+  for (const uint64_t num_bytes : {uint64_t{133'592'727}, uint64_t{133'592'728}, uint64_t{1} << 59}) {
+    SQLite::Database database = OpenImmutable(path);
+    LimitSteps(database, num_bytes);
+    EXPECT_EQ(database.execAndGet("SELECT count(*) FROM t a, t b").getInt(), 16'777'216) << num_bytes;
+  }
+}
+
 TEST_F(HardenedDatabase, StatementsOfColmapsDatabasesEndToo) {
   std::string sql = std::string(kColmapSchema) + "; CREATE TABLE t (x); INSERT INTO t VALUES (1)";
   for (int i = 0; i < 12; ++i) sql += "; INSERT INTO t SELECT * FROM t";

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <map>
 
@@ -115,6 +116,9 @@ TEST_F(FolderTest, AFolderThatOnlyLooksLikeOneOfOursIsRefused) {
     Write(std::string("out/") + name, "somebody's own");
   EXPECT_THAT(Refusal(), HasSubstr("nothing shows that cairn made it"));
   EXPECT_THAT(Refusal(), HasSubstr("name another folder, or move this one away"));
+  for (const char* name : {"images.txt", "cameras.txt", "cameras.bin", "frame.json"})
+    fs::remove(Path(std::string("out/") + name));
+  EXPECT_THAT(Refusal(), HasSubstr("out: holds sessions.txt, and nothing shows that cairn made it"));
 }
 
 TEST_F(FolderTest, AForeignFileAnywhereIsRefusedAndNamed) {
@@ -311,6 +315,16 @@ TEST_F(FolderTest, OtherFoldersWithTheNameOfALeftoverStay) {
   for (const std::string& kept :
        {dead, std::string("out.tmp-1"), std::string("out.tmp-notes"), dead + "-old"})
     EXPECT_GT(std::distance(fs::directory_iterator(Path(kept)), fs::directory_iterator()), 0) << kept;
+}
+
+// The process that writes it is this one; what an earlier call said of another process does not count.
+TEST_F(FolderTest, FoldersThatLivingProcessesWriteStay) {
+  const std::string written = fmt::format("out.tmp-{}", getpid());
+  Write(written + "/images/1.png", "half");
+  ASSERT_TRUE(BeginOwnFolder(Path(written), "a capture").ok());
+  errno = ESRCH;
+  ASSERT_TRUE(Replace("new").ok());
+  EXPECT_EQ(Tree().at(written + "/images/1.png"), "half");
 }
 
 TEST_F(FolderTest, TheOldFolderComesBackWhereAProcessDiedBetweenTwoRenames) {

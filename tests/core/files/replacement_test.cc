@@ -137,6 +137,22 @@ TEST_F(ReplacementTest, OwnerGroupAndModeStay) {
   EXPECT_EQ(StatusOf(path).st_gid, before.st_gid);
 }
 
+// Root may give files away, also those that their owner alone, or their group alone, can read.
+TEST_F(ReplacementTest, RootKeepsOwnersWhoAloneCanReadTheFile) {
+  if (!IsRoot()) GTEST_SKIP() << "only root can give files away";
+  for (const mode_t mode : {0600, 0040, 0604, 0000}) {
+    const std::string path = Make("file", "old", mode);
+    ASSERT_EQ(chown(path.c_str(), 1234, 4321), 0);
+    const Status status = WriteFileAtomically(path, "new");
+    ASSERT_TRUE(status.ok()) << status.error().message;
+    EXPECT_EQ(*ReadFile(path), "new");
+    EXPECT_EQ(ModeOf(path), mode);
+    EXPECT_EQ(StatusOf(path).st_uid, 1234U);
+    EXPECT_EQ(StatusOf(path).st_gid, 4321U);
+    fs::remove(path);
+  }
+}
+
 TEST_F(ReplacementTest, UntilItIsInPlaceItIsAsPrivateAsAnyFileThatItReplaces) {
   Make("file", "old", 0600);
   const Result<Replacement> file = Replacement::Begin(Path("file"));

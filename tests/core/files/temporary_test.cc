@@ -91,6 +91,10 @@ TEST(FileDescriptor, AllBytesAreReadAndWrittenOrItSaysWhyNot) {
   ASSERT_TRUE(WriteAllAt(file.get(), "ab", 2, 9));
   ASSERT_TRUE(ReadAllAt(file.get(), bytes.data(), 3, 8));
   EXPECT_EQ(bytes, "8ab9");
+  // What interrupted an earlier call is none of this one's.
+  errno = EINTR;
+  ASSERT_TRUE(ReadAllAt(file.get(), bytes.data(), 3, 0) && WriteAllAt(file.get(), bytes.data(), 3, 0));
+  EXPECT_EQ(bytes, "0129");
   const FileDescriptor full(open("/dev/full", O_WRONLY));
   EXPECT_FALSE(WriteAllAt(full.get(), "ab", 2, 0));
   EXPECT_EQ(errno, ENOSPC);
