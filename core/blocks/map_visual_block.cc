@@ -16,7 +16,7 @@ constexpr double kLeastPixel = -2048;  // a turn moves sights out of their image
 constexpr double kMostPixel = 6143;
 constexpr double kOctaveUnit = 1.0 / 16;
 constexpr double kLeastOctave = -4;
-constexpr double kHeadingUnitDeg = 0.01;
+constexpr double kModelHeadingUnitDeg = 0.01;
 constexpr int kMaxNumHeadings = 64;
 constexpr uint8_t kBadFlag = 0x80;
 
@@ -29,7 +29,7 @@ uint8_t OctaveCode(float octave) {
 }
 float OctaveOf(uint8_t code) { return static_cast<float>(kLeastOctave + code * kOctaveUnit); }
 uint16_t HeadingCode(double heading_deg) {
-  return static_cast<uint16_t>(std::lround(heading_deg / kHeadingUnitDeg));
+  return static_cast<uint16_t>(std::lround(heading_deg / kModelHeadingUnitDeg));
 }
 
 Eigen::Vector3f RoundSeen(const Eigen::Vector3f& seen) {
@@ -110,7 +110,8 @@ void ReadModel(BlobReader* reader, int64_t num_images, int64_t* max_num_values, 
 }  // namespace
 
 Status RoundAsStored(VisualMapData* visual_map) {
-  for (double& heading : visual_map->headings_deg) heading = (HeadingCode(heading) % 36000) * kHeadingUnitDeg;
+  for (double& heading : visual_map->headings_deg)
+    heading = (HeadingCode(heading) % 36000) * kModelHeadingUnitDeg;
   for (std::vector<HeadingModel>& models : visual_map->landmarks) {
     for (HeadingModel& model : models) {
       for (double& sigma : model.sigma) sigma = DecodeSize(EncodeSize(sigma));
@@ -188,7 +189,7 @@ Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& 
   for (int i = 0; i < num_headings && reader.ok(); ++i) {
     const uint64_t code = reader.Varint();
     if (code >= 36000) return Corrupt(what, "heading {} is {} hundredths of a degree", i, code);
-    block.part.headings_deg.push_back(static_cast<double>(code) * kHeadingUnitDeg);
+    block.part.headings_deg.push_back(static_cast<double>(code) * kModelHeadingUnitDeg);
   }
   if (camera_id != block.part.camera_id) return Corrupt(what, "camera {} is not valid", camera_id);
   int64_t max_num_values = kMaxListElements;
