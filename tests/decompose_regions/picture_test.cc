@@ -196,6 +196,7 @@ TEST(Picture, CellsShrinkSoThatTheLongerSideFitsButNotToNothing) {
     const DrawnLattice there{.offset = {10, -10}};
     return DrawDecomposition(there.Placed(AsciiWorld({std::string(num_stations, 'o')}, {})), {});
   };
+  EXPECT_THAT(row(1), HasSubstr("width=\"468\""));     // 3 cells of 56 px
   EXPECT_THAT(row(3), HasSubstr("width=\"580\""));     // 5 cells of 56 px
   EXPECT_THAT(row(38), HasSubstr("width=\"1300\""));   // 40 cells of 25 px
   EXPECT_THAT(row(198), HasSubstr("width=\"1900\""));  // 200 cells of 8 px
@@ -253,6 +254,17 @@ TEST(Picture, SectorsPointToTheirHeadingAndAreAsWideAsHeadingsLieApart) {
   world.headings_deg = {0, 80, 140};
   EXPECT_THAT(DrawDecomposition(world, {.regions = {{{}, {0}}}}),
               HasSubstr("\"M84.0 84.0L106.8 97.2A26.3 26.3 0 0 0 106.8 70.8Z\""));
+}
+
+TEST(Picture, SectorsGrowWithTheLattice) {
+  // Two stations half a metre or four metres apart are drawn as those at one metre.
+  const Decomposition decomposition{.algorithm = "b2", .k = 1, .regions = {{{0}, {0, 1}}}};
+  for (const double side_m : {0.5, 1.0, 4.0}) {
+    World world = DrawnLattice{.side_m = side_m}.Placed(AsciiWorld({"oo"}, {{"##"}}));
+    world.headings_deg = {0, 90};
+    EXPECT_THAT(DrawDecomposition(world, decomposition),
+                HasSubstr("\"M140.0 84.0L158.6 65.4A26.3 26.3 0 0 0 121.4 65.4Z\""));
+  }
 }
 
 TEST(Picture, HolesAndWhatIsNotCoverableStandWhereTheirStationsDo) {
