@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,6 +66,49 @@ TEST(RowLimits, NumbersOfTheHeadAreInRange) {
                 r.sessions = {"a", "b", "b"};
               }),
               HasSubstr("session 'b' is listed twice"));
+}
+
+// Each station, from the first to the last one.
+TEST(RowLimits, StationsStandAtFinitePlaces) {
+  for (size_t i = 0; i < FullRows().stations.size(); ++i) {
+    const std::string refusal = fmt::format("station {}: its place is not finite", i);
+    EXPECT_THAT(RowsRefusal([&](MapRows& r) { r.stations[i].position.x() = std::nan(""); }),
+                HasSubstr(refusal));
+    EXPECT_THAT(RowsRefusal([&](MapRows& r) { r.stations[i].heading_deg = HUGE_VAL; }), HasSubstr(refusal));
+  }
+}
+
+// As many as the regions that there are, or none; no station may be left uncovered, or any number.
+TEST(RowLimits, LowerBoundsAreOfRegionsThatThereAre) {
+  const auto refusal = [](std::optional<int> lower_bound, int uncovered_limit) {
+    return RowsRefusal([&](MapRows& r) {
+      r.lower_bound = lower_bound;
+      r.uncovered_limit = uncovered_limit;
+    });
+  };
+  const auto num_regions = static_cast<int>(FullRows().regions.size());
+  for (const int uncovered_limit : {0, 1, 1'000'000}) {
+    for (const std::optional<int> lower_bound :
+         {std::optional<int>(), std::optional(0), std::optional(num_regions)})
+      EXPECT_EQ(refusal(lower_bound, uncovered_limit), "");
+    EXPECT_THAT(refusal(num_regions + 1, uncovered_limit), HasSubstr("with a lower bound of"));
+    EXPECT_THAT(refusal(-1, uncovered_limit), HasSubstr("with a lower bound of -1"));
+  }
+  EXPECT_THAT(refusal({}, -1), HasSubstr("-1 stations uncovered"));
+}
+
+TEST(RowLimits, ModelsHaveKernelsThatThereAre) {
+  const auto refusal = [](KernelShape shape) {
+    return RowsRefusal([&](MapRows& r) { r.visual_map.landmarks[0][0].shape = shape; });
+  };
+  for (const int length : {0, kNumKernelLengths - 1}) {
+    for (const int noise : {0, kNumKernelNoises - 1}) EXPECT_EQ(refusal({length, noise}), "");
+    for (const int noise : {-1, int{kNumKernelNoises}})
+      EXPECT_THAT(refusal({length, noise}),
+                  HasSubstr(fmt::format("there is no kernel {}, {}", length, noise)));
+  }
+  for (const int length : {-1, int{kNumKernelLengths}})
+    EXPECT_THAT(refusal({length, 0}), HasSubstr(fmt::format("there is no kernel {}, 0", length)));
 }
 
 // Cameras 3 and 9 of the map, as the capture states them.
