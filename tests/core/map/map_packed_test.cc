@@ -12,6 +12,7 @@
 #include "core/map/map_file.h"
 #include "core/packing/packed_sights.h"
 #include "tests/core/map/packed_rows.h"
+#include "tests/core/map/sealed_blocks.h"
 
 namespace cairn {
 namespace {
@@ -154,6 +155,35 @@ TEST(PackedMap, BlocksOfMoreLandmarksThanAreWrittenAreRefused) {
 }
 
 // Three images of five landmarks: the images' lists alone, by bits whose models are all even at first.
+// The second of two blocks of landmarks is that of a map whose descriptors are of coarser levels.
+TEST(PackedMap, BlocksOfLandmarksWithDifferentCodesAreRefused) {
+  const std::string path = testing::TempDir() + "/two_codes.cairn";
+  std::vector<std::vector<BlockContents>> maps;
+  std::string bytes;
+  for (const int step : {40, 24}) {
+    ASSERT_TRUE(WriteMapRows(PackedRows(step), path).ok());
+    const MapFile file = *MapFile::Open(path, {});
+    maps.push_back(BlocksOf(file));
+    for (size_t i = 0; i < maps.back().size(); ++i)
+      maps.back()[i].is_packed = file.directory().blocks()[i].is_packed;
+    bytes = *ReadFile(path);
+  }
+  std::vector<BlockContents>& blocks = maps[1];
+  ASSERT_TRUE(WriteSealedBlocks(bytes, blocks, path).ok());
+  EXPECT_TRUE(ReadMapRows(path).ok()) << ReadMapRows(path).error().message;
+  size_t second = blocks.size();
+  while (blocks[--second].kind != BlockKind::kLandmarks) continue;
+  ASSERT_EQ(blocks[second - 1].kind, BlockKind::kLandmarks);
+  ASSERT_EQ(blocks[second].count, maps[0][second].count);
+  blocks[second] = maps[0][second];
+  ASSERT_TRUE(WriteSealedBlocks(bytes, blocks, path).ok());
+  const Result<MapRows> read = ReadMapRows(path);
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(read.error().message,
+              testing::HasSubstr("its blocks of landmarks are coded in different ways"));
+}
+
 TEST(PackedSights, ListsOfAnyKindAreRead) {
   SightLists images(5);
   images[0] = {0, 1, 4};
