@@ -26,10 +26,12 @@ constexpr const char* kAside = "-old";  // after a temporary's name: the old fol
 // `sync`: fsync for the folder's own entries, syncfs for all that was written to its file system.
 Status Sync(const std::string& folder, int (*sync)(int)) {
   const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const int synced = fd < 0 ? -1 : sync(fd);
+  if (fd < 0) return WriteError(folder, "cannot be synced", errno);
+  const int synced = sync(fd);
   const int error = errno;
-  if (fd >= 0) close(fd);
-  return synced == 0 ? Ok() : WriteError(folder, "cannot be synced", error);
+  close(fd);
+  // EINVAL: a file system that has nothing to sync there.
+  return synced == 0 || error == EINVAL ? Ok() : WriteError(folder, "cannot be synced", error);
 }
 
 bool Exists(const std::string& path) {

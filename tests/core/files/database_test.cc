@@ -155,22 +155,27 @@ int NumSteps(const std::string& path, const std::string& sql) {
   return num_steps;
 }
 
-// 10 million, and 16 for each byte of the file: a longer file may take as many as a shorter one may not.
+// 10 million, and 16 for each byte of the file, up to a hundredth.
 TEST_F(HardenedDatabase, LongerFilesMayTakeMoreSteps) {
-  std::string sql = "CREATE TABLE t (x); INSERT INTO t VALUES (1)";
-  for (int i = 0; i < 11; ++i) sql += "; INSERT INTO t SELECT * FROM t";  // 2048 rows
-  const std::string query = "SELECT sum(a.x + b.x) FROM t a, t b";
-  for (const bool is_long : {false, true}) {
+  const auto query = [](int num_rows) {
+    return fmt::format(
+        "WITH RECURSIVE c (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM c WHERE i < {}) SELECT max(i) FROM c",
+        num_rows);
+  };
+  for (const int num_bytes : {1000, 400'000}) {
     const std::string path =
-        Write(sql + (is_long ? "; CREATE TABLE p (x); INSERT INTO p VALUES (zeroblob(2000000))" : ""));
+        Write(fmt::format("CREATE TABLE p (x); INSERT INTO p VALUES (zeroblob({}))", num_bytes));
     const auto most = static_cast<double>(10'000'000 + 16 * fs::file_size(path));
-    ASSERT_EQ(NumSteps(path, query) <= most, is_long) << NumSteps(path, query) << " steps of " << most;
-    const Status status = WithDatabaseErrors(path, [&]() -> Status {
-      SQLite::Database database = OpenDatabaseReadOnly(path).value();
-      EXPECT_EQ(database.execAndGet(query).getInt(), 2 * 2048 * 2048);
-      return Ok();
-    });
-    EXPECT_EQ(status.ok(), is_long);
+    const double steps_per_row = (NumSteps(path, query(2000)) - NumSteps(path, query(1000))) / 1000.0;
+    for (const auto& [part, is_allowed] : {std::pair(0.99, true), std::pair(1.01, false)}) {
+      const auto num_rows = static_cast<int>(part * most / steps_per_row);
+      const Status status = WithDatabaseErrors(path, [&]() -> Status {
+        SQLite::Database database = OpenDatabaseReadOnly(path).value();
+        EXPECT_EQ(database.execAndGet(query(num_rows)).getInt(), num_rows);
+        return Ok();
+      });
+      EXPECT_EQ(status.ok(), is_allowed) << part << " of " << most;
+    }
   }
 }
 
@@ -236,6 +241,17 @@ TEST_F(HardenedDatabase, HeadersSayHowLongTheFileIs) {
     EXPECT_EQ(header.page_size, page_size) << size;
     EXPECT_EQ(header.num_pages, num_pages) << size;
   }
+}
+
+// Two bytes have no room for it: a 1 stands for it.
+TEST_F(HardenedDatabase, LargestPagesAreOf65536Bytes) {
+  const std::string path = Write("PRAGMA page_size = 65536; CREATE TABLE t (x)");
+  EXPECT_EQ(ReadSqliteHeader(path).page_size, 65536u);
+  EXPECT_EQ(ReadSqliteHeader(path).num_pages, 2u);
+  EXPECT_TRUE(OpenDatabaseReadOnly(path).ok());
+  fs::resize_file(path, 65536 + 32768);
+  EXPECT_THAT(OpenDatabaseReadOnly(path).error().message,
+              HasSubstr("98304 bytes, not a multiple of the page size 65536"));
 }
 
 TEST_F(HardenedDatabase, NamesOfFilesAreNoOptionsOfAUri) {

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <functional>
 
@@ -14,6 +15,7 @@
 
 #include "core/files/database.h"
 #include "core/files/file.h"
+#include "core/files/file_descriptor.h"
 #include "core/files/temporary.h"
 
 namespace cairn {
@@ -140,7 +142,7 @@ TEST_F(ReplacementTest, OwnerGroupAndModeStay) {
 // Root may give files away, also those that their owner alone, or their group alone, can read.
 TEST_F(ReplacementTest, RootKeepsOwnersWhoAloneCanReadTheFile) {
   if (!IsRoot()) GTEST_SKIP() << "only root can give files away";
-  for (const mode_t mode : {0600, 0040, 0604, 0000}) {
+  for (const mode_t mode : {0600, 0400, 0040, 0604, 0000}) {
     const std::string path = Make("file", "old", mode);
     ASSERT_EQ(chown(path.c_str(), 1234, 4321), 0);
     const Status status = WriteFileAtomically(path, "new");
@@ -158,6 +160,19 @@ TEST_F(ReplacementTest, UntilItIsInPlaceItIsAsPrivateAsAnyFileThatItReplaces) {
   const Result<Replacement> file = Replacement::Begin(Path("file"));
   ASSERT_TRUE(file.ok());
   EXPECT_EQ(ModeOf(file->temporary()), 0600U);
+}
+
+// The folders of /proc have nothing to sync: that is no error.  What is no folder, nor any open file, is one,
+// which says that the file is in place all the same.
+TEST_F(ReplacementTest, FoldersWithNothingToSyncAreSynced) {
+  const FileDescriptor proc(open("/proc", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  errno = 0;
+  if (fsync(proc.get()) == 0 || errno != EINVAL) GTEST_SKIP() << "/proc syncs";
+  EXPECT_TRUE(SyncFolderOf("/proc/file", proc.get()).ok());
+  const Status status = SyncFolderOf("/proc/file", -1);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kIo);
+  EXPECT_THAT(status.error().message, HasSubstr("/proc/file: is in place; but its folder /proc cannot be"));
 }
 
 // Another user may write the folder, but cannot give files away.
@@ -299,6 +314,31 @@ TEST_F(ReplacementTest, CopiesWholeFiles) {
   Result<Replacement> none = Replacement::Begin(Path("none"));
   EXPECT_EQ(none->CopyFrom(Path("nowhere")).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(none->CopyFrom(folder_).error().code, ErrorCode::kIo);
+}
+
+// A pipe gives what there is: less than is asked for, and then the rest.
+TEST_F(ReplacementTest, CopiesWhatComesInPieces) {
+  std::string bytes;
+  for (int i = 0; i < 70'000; ++i) bytes += static_cast<char>('a' + i % 23);
+  ASSERT_EQ(mkfifo(Path("pipe").c_str(), 0600), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const FileDescriptor pipe(open(Path("pipe").c_str(), O_WRONLY | O_CLOEXEC));
+    size_t num_written = 0;
+    for (const size_t end : {size_t{10}, size_t{1000}, bytes.size()}) {
+      while (num_written < end) {
+        const ssize_t num = write(pipe.get(), bytes.data() + num_written, end - num_written);
+        if (num < 0) _exit(1);
+        num_written += static_cast<size_t>(num);
+      }
+      usleep(20'000);
+    }
+    _exit(0);
+  }
+  Result<Replacement> file = Replacement::Begin(Path("copy"));
+  ASSERT_TRUE(file.ok() && file->CopyFrom(Path("pipe")).ok() && file->Finish().ok());
+  waitpid(child, nullptr, 0);
+  EXPECT_EQ(*ReadFile(Path("copy")), bytes);
 }
 
 // Its first page cannot be read: that is no empty file.
