@@ -44,6 +44,18 @@ std::vector<Part> Everything() {
           {BlockKind::kFloorPlan},     {BlockKind::kViewRegions}, {BlockKind::kLandmarkModels}};
 }
 
+TEST(MapDirectoryLimits, EntriesThatAreCutOffAreRefused) {
+  const std::string bytes = Of({{BlockKind::kImages}, {BlockKind::kLandmarks}}).Encode();
+  ASSERT_EQ(bytes.size(), 2 * 69u);
+  EXPECT_EQ(RefusalOf(MapDirectory::Decode(bytes, kManyBytes)), "");
+  for (const size_t size : {size_t{1}, size_t{68}, size_t{70}, bytes.size() - 1})
+    EXPECT_THAT(RefusalOf(MapDirectory::Decode(bytes.substr(0, size), kManyBytes)),
+                HasSubstr("its entry is cut off"))
+        << size;
+  EXPECT_THAT(RefusalOf(MapDirectory::Decode(bytes + '\0', kManyBytes)),
+              HasSubstr("block 2 (kind 0): its entry is cut off"));
+}
+
 // By hand: kind 6, elements 32 to 34, 1000 bytes; the hash; the box, least corner first.
 TEST(MapDirectoryLimits, AnEntryIsDrawnInSixtyNineBytes) {
   MapDirectory directory =

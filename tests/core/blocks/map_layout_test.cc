@@ -174,8 +174,8 @@ TEST(MapLayoutSizes, DocumentsAreImages) {
 }
 
 // A strip of 4100 faces: each shares its first two corners with the one before, and every third has a border
-// that ends at a vertex which no face has as a corner up to there.
-Views Strip(FaceIdx num_faces) {
+// that ends, or begins, at a vertex which no face has as a corner up to there.
+Views Strip(FaceIdx num_faces, bool begins) {
   Views views;
   views.plan.walls.resize(2);
   views.face_offsets = {0};
@@ -191,16 +191,17 @@ Views Strip(FaceIdx num_faces) {
     views.toggled_labels.push_back(face % 4);
     views.toggle_offsets.push_back(static_cast<int64_t>(views.toggled_labels.size()));
     views.index.push_back({.num_labels = face % 4});
-    if (face + 1 < num_faces) views.links.push_back({face, face + 1, c, face % 3 == 0 ? next++ : d});
+    const int32_t other = face % 3 == 0 ? next++ : d;
+    if (face + 1 < num_faces) views.links.push_back({face, face + 1, begins ? other : c, begins ? c : other});
     a = c, b = d;
   }
   for (int32_t i = 0; i < next; ++i) views.vertices.push_back({3 * i, -i});
   return views;
 }
 
-TEST(MapLayoutSizes, ViewRegionsOfTwoBlocksComeBack) {
+void ExpectStripComesBack(bool begins) {
   MapRows rows;
-  rows.views = Strip(4100);
+  rows.views = Strip(4100, begins);
   const MapLayout layout(rows);
   EXPECT_THAT(BlocksOfKind(layout, BlockKind::kViewRegions), ElementsAre(Pair(0, 4096), Pair(4096, 4)));
   MapDirectory directory;
@@ -214,6 +215,11 @@ TEST(MapLayoutSizes, ViewRegionsOfTwoBlocksComeBack) {
     ASSERT_TRUE(block.ok()) << block.error().message;
     EXPECT_TRUE(AppendRegions(*block, "block", &read).ok());
     EXPECT_EQ(EncodeBlock(*block), layout.Encode(entry));
+    // Of a border's vertices, those that are no corner up to there come before it.
+    for (const ViewBlock::Region& region : block->regions) {
+      const bool is_named_first = !region.links.empty() && region.links[0].a % 3 == 0;
+      ASSERT_EQ(region.num_more_vertices, is_named_first ? 1 : 0);
+    }
     // Again, it does not follow.
     EXPECT_THAT(AppendRegions(*block, "block", &read).error().message, testing::HasSubstr("come before it"));
   }
@@ -223,6 +229,10 @@ TEST(MapLayoutSizes, ViewRegionsOfTwoBlocksComeBack) {
   EXPECT_EQ(read.parents, rows.views.parents);
   EXPECT_EQ(read.toggled_labels, rows.views.toggled_labels);
   EXPECT_EQ(read.links, rows.views.links);
+}
+
+TEST(MapLayoutSizes, ViewRegionsOfTwoBlocksComeBack) {
+  for (const bool begins : {false, true}) ExpectStripComesBack(begins);
 }
 
 }  // namespace

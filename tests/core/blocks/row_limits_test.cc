@@ -68,6 +68,13 @@ TEST(RowLimits, NumbersOfTheHeadAreInRange) {
               HasSubstr("session 'b' is listed twice"));
 }
 
+// Each camera, from the first to the last one.
+TEST(RowLimits, CamerasHaveTheParametersOfTheirModel) {
+  for (size_t i = 0; i < FullRows().cameras.size(); ++i)
+    EXPECT_THAT(RowsRefusal([&](MapRows& r) { r.cameras[i].params.pop_back(); }),
+                HasSubstr(fmt::format("camera {}", FullRows().cameras[i].camera_id)));
+}
+
 // Each station, from the first to the last one.
 TEST(RowLimits, StationsStandAtFinitePlaces) {
   for (size_t i = 0; i < FullRows().stations.size(); ++i) {
