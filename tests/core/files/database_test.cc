@@ -100,6 +100,18 @@ TEST_F(HardenedDatabase, ValuesAreNoLongerThanTheFile) {
                SQLite::Exception);
 }
 
+// Of a file of up to 100 kB, values of 100 kB; SQLite has none of more than 10^9 bytes.
+TEST_F(HardenedDatabase, ValuesHaveALimitWhateverTheFilesSize) {
+  const std::string path = Write("CREATE TABLE t (x)");
+  for (const auto& [num_bytes, most] :
+       {std::pair(uint64_t{0}, 100'000), std::pair(uint64_t{100'000}, 100'000),
+        std::pair(uint64_t{100'001}, 100'001), std::pair(uint64_t{1} << 40, 1'000'000'000)}) {
+    SQLite::Database database(path);
+    Harden(database, num_bytes);
+    EXPECT_EQ(sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH, -1), most);
+  }
+}
+
 TEST_F(HardenedDatabase, ColmapDatabasesAreHardenedHoweverTheyAreOpened) {
   const std::string sql = std::string(kColmapSchema) + "; CREATE VIEW v AS SELECT 2 AS x";
   const auto expect_hardened = [](const std::string& path) {

@@ -341,6 +341,29 @@ TEST_F(FolderTest, TheOldFolderComesBackWhereAProcessDiedBetweenTwoRenames) {
   EXPECT_EQ(Tree().at(theirs + "/letter.txt"), "mine");
 }
 
+// The manifests say that they are whole, of one kind, and of the same entries; the first still has them.
+TEST_F(FolderTest, FoldersThatHoldTheSameAreWholeAndOfOneKind) {
+  for (const char* name : {"a", "b"}) {
+    fs::create_directories(Path(name));
+    ASSERT_TRUE(FinishOwnFolder(Path(name), "a capture").ok());
+  }
+  EXPECT_TRUE(HoldsTheSame(Path("a"), Path("b")));
+  EXPECT_FALSE(HoldsTheSame(Path("a"), Path("none")));
+  EXPECT_FALSE(HoldsTheSame(Path("none"), Path("b")));
+  ASSERT_TRUE(BeginOwnFolder(Path("b"), "a capture").ok());
+  EXPECT_FALSE(HoldsTheSame(Path("a"), Path("b")));
+  EXPECT_FALSE(HoldsTheSame(Path("b"), Path("a")));
+  ASSERT_TRUE(FinishOwnFolder(Path("b"), "a model").ok());
+  EXPECT_FALSE(HoldsTheSame(Path("a"), Path("b")));
+  Write("a/list.txt", "text");
+  Write("b/list.txt", "text");
+  for (const char* name : {"a", "b"}) ASSERT_TRUE(FinishOwnFolder(Path(name), "a capture").ok());
+  EXPECT_TRUE(HoldsTheSame(Path("a"), Path("b")));
+  fs::remove(Path("a/list.txt"));
+  EXPECT_FALSE(HoldsTheSame(Path("a"), Path("b")));
+  EXPECT_TRUE(HoldsTheSame(Path("b"), Path("a")));
+}
+
 TEST_F(FolderTest, OwnFilesAreThoseThatNobodyChanged) {
   ASSERT_TRUE(Replace("old").ok());
   Write("out/list.txt", "odl");

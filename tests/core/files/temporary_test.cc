@@ -1,11 +1,13 @@
 #include "core/files/temporary.h"
 
 #include <fcntl.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -98,6 +100,22 @@ TEST(FileDescriptor, AllBytesAreReadAndWrittenOrItSaysWhyNot) {
   const FileDescriptor full(open("/dev/full", O_WRONLY));
   EXPECT_FALSE(WriteAllAt(full.get(), "ab", 2, 0));
   EXPECT_EQ(errno, ENOSPC);
+}
+
+// A file of /proc gives a page at most at a time.
+TEST(FileDescriptor, WhatComesInPiecesIsReadWhole) {
+  // No memory is taken between the two readings, which would change what the file says.
+  static char expected[12'000], bytes[sizeof(expected)];
+  const FileDescriptor file(open("/proc/self/maps", O_RDONLY | O_CLOEXEC));
+  size_t num_read = 0;
+  while (num_read < sizeof(expected)) {
+    const ssize_t num = read(file.get(), expected + num_read, sizeof(expected) - num_read);
+    if (num <= 0) break;
+    num_read += static_cast<size_t>(num);
+  }
+  if (num_read < sizeof(expected)) GTEST_SKIP() << "this program is small";
+  ASSERT_TRUE(ReadAllAt(file.get(), bytes, sizeof(bytes), 0));
+  EXPECT_EQ(std::string_view(bytes, sizeof(bytes)), std::string_view(expected, sizeof(expected)));
 }
 
 }  // namespace
