@@ -1,4 +1,5 @@
 // What blocks share: models of one survey, and descriptors of any number of bits.
+#include <algorithm>
 #include <functional>
 
 #include <gmock/gmock.h>

@@ -1,5 +1,6 @@
 #include "core/files/disk_space.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 
