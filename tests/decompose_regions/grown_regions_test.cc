@@ -80,6 +80,27 @@ TEST(DecomposeRegions, BoundIsTheOneThatIsAskedFor) {
   }
 }
 
+// A feature for any two stations that stand beside each other, so that the row is one part of the world, and
+// more of them than "best" covers at once: what 120 regions cover.
+//   # # . . .
+//   . # # . .   and so on
+TEST(DecomposeRegions, BoundOfALargeWorldIsCertifiedWhereItIsAskedFor) {
+  constexpr int kNumRegions = 150;
+  World world = AsciiWorld({std::string(2 * kNumRegions, 'o')}, {});
+  for (StationIdx station = 0; station + 1 < 2 * kNumRegions; ++station)
+    world.areas.push_back({station, station + 1});
+  for (const char* lower_bound : {"auto", "certified"}) {
+    const Decomposition d = Decompose(world, {.algorithm = "best",
+                                              .k = 1,
+                                              .tau = 0,
+                                              .rho = 0,
+                                              .lower_bound = lower_bound,
+                                              .best_window_stations = 1});
+    EXPECT_GE(d.regions.size(), static_cast<size_t>(kNumRegions));
+    EXPECT_EQ(d.lower_bound, kNumRegions) << lower_bound;
+  }
+}
+
 TEST(DecomposeRegions, WorldOfOneStationIsARegion) {
   for (const char* algorithm : kEachAlgorithm) {
     const Decomposition d =
