@@ -26,7 +26,8 @@ class Remote : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>("remote_test");
     fs::create_directory(*folder_ / "server");
-    WriteSmallRecipe(*folder_ / "server/survey.toml");  // a compile through the server takes three times as long
+    WriteSmallRecipe(*folder_ /
+                     "server/survey.toml");  // a compile through the server takes three times as long
     const ProgramRun rendered =
         RunShell(fmt::format("cairn stage simulate {0}.toml -o {0}", *folder_ / "server/survey"));
     ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
