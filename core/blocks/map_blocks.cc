@@ -108,7 +108,7 @@ Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& en
     block.is_packed = true;
     SightLists lists(block.images.size());
     if (!reader.ok() || !UnpackSights(reader.Bytes(reader.num_left()), directory.Count(BlockKind::kLandmarks),
-                                      kMaxImageLandmarks, &lists)) {
+                                      kMaxImageLandmarks, &max_num_landmarks, &lists)) {
       return Corrupt(what, "the packed landmarks of {} images make no sense", entry.count);
     }
     for (size_t i = 0; i < lists.size(); ++i) block.images[i].landmarks = std::move(lists[i]);

@@ -68,12 +68,14 @@ bool ReadDifferences(const MadeLists& lists, BlobReader* reader, int64_t* num_le
     SightLists differences(std::min(kListsAtOnce, lists.lists.size() - begin));
     const std::string_view packed = reader->Bytes(reader->Varint());
     // A list may lose as many as it has and get as many as it may have.
-    if (!reader->ok() || !UnpackSights(packed, lists.num_elements, 2 * lists.max_length, &differences))
+    if (!reader->ok() ||
+        !UnpackSights(packed, lists.num_elements, 2 * lists.max_length, num_left, &differences)) {
       return false;
+    }
     for (size_t i = 0; i < differences.size(); ++i) {
       std::vector<int32_t>& list = *lists.lists[begin + i];
       list = SymmetricDifference(list, differences[i]);
-      *num_left -= static_cast<int64_t>(list.size() + differences[i].size());
+      *num_left -= std::ssize(list);
       if (list.size() > lists.max_length || *num_left < 0) return false;
     }
   }

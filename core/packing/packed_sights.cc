@@ -36,16 +36,14 @@ int64_t CountBetween(const std::vector<int32_t>& sorted, int64_t begin, int64_t 
 template <typename Coder>
 class SightsCoder {
  public:
-  SightsCoder(Coder& coder, int64_t num_landmarks, size_t max_num_seen)
-      : coder_(coder),
-        num_landmarks_(num_landmarks),
-        max_num_seen_(max_num_seen),
-        models_(std::make_unique<SightModels>()) {}
+  SightsCoder(Coder& coder, int64_t num_landmarks)
+      : coder_(coder), num_landmarks_(num_landmarks), models_(std::make_unique<SightModels>()) {}
 
   // False where there are more landmarks than an image may have.
-  bool Code(std::array<int, 2> references, const SightLists& images, size_t image,
+  bool Code(std::array<int, 2> references, const SightLists& images, size_t image, size_t max_num_seen,
             std::vector<int32_t>* landmarks) {
     static const std::vector<int32_t> kNothing;
+    max_num_seen_ = max_num_seen;
     given_ = landmarks;
     for (size_t i = 0; i < references.size(); ++i) {
       const auto back = models_->references[i].Code(coder_, static_cast<uint32_t>(references[i]));
@@ -122,7 +120,7 @@ class SightsCoder {
 
   Coder& coder_;
   int64_t num_landmarks_;
-  size_t max_num_seen_;
+  size_t max_num_seen_ = 0;
   std::unique_ptr<SightModels> models_;
   std::vector<std::pair<int32_t, int>> times_seen_;
   std::vector<int32_t> seen_;
@@ -159,25 +157,27 @@ std::string PackSights(const SightLists& images) {
   BlobWriter writer;
   writer.Varint(static_cast<uint64_t>(num_landmarks));
   RangeEncoder coder;
-  SightsCoder<RangeEncoder> sights(coder, num_landmarks, std::numeric_limits<size_t>::max());
+  SightsCoder<RangeEncoder> sights(coder, num_landmarks);
   for (size_t image = 0; image < images.size(); ++image) {
     std::vector<int32_t> landmarks = images[image];
-    sights.Code(BestReferences(images, image), images, image, &landmarks);
+    sights.Code(BestReferences(images, image), images, image, landmarks.size(), &landmarks);
   }
   writer.Bytes(coder.Take());
   return writer.Take();
 }
 
-bool UnpackSights(std::string_view bytes, int64_t max_num_landmarks, size_t max_num_seen,
+bool UnpackSights(std::string_view bytes, int64_t max_num_landmarks, size_t max_num_seen, int64_t* num_left,
                   SightLists* images) {
   BlobReader reader(bytes);
   const auto num_landmarks = static_cast<int64_t>(reader.Varint());
   if (!reader.ok() || num_landmarks < 0 || num_landmarks > max_num_landmarks) return false;
   RangeDecoder coder(reader.Bytes(reader.num_left()));
-  SightsCoder<RangeDecoder> sights(coder, num_landmarks, max_num_seen);
+  SightsCoder<RangeDecoder> sights(coder, num_landmarks);
   for (size_t image = 0; image < images->size() && coder.ok(); ++image) {
     std::vector<int32_t> landmarks;
-    if (!sights.Code({}, *images, image, &landmarks)) return false;
+    const size_t most = std::min(max_num_seen, static_cast<size_t>(std::max<int64_t>(0, *num_left)));
+    if (!sights.Code({}, *images, image, most, &landmarks)) return false;
+    *num_left -= std::ssize(landmarks);
     (*images)[image] = std::move(landmarks);
   }
   return coder.Finished();

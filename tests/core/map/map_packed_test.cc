@@ -192,10 +192,11 @@ TEST(PackedSights, ListsOfAnyKindAreRead) {
   images[4] = {99'999};
   const std::string bytes = PackSights(images);
   SightLists read(5);
-  ASSERT_TRUE(UnpackSights(bytes, 100'000, 10, &read));
+  int64_t num_left = 1000;
+  ASSERT_TRUE(UnpackSights(bytes, 100'000, 10, &num_left, &read));
   for (size_t i = 0; i < images.size(); ++i) EXPECT_EQ(read[i], images[i]) << i;
-  EXPECT_FALSE(UnpackSights(bytes, 99'999, 10, &read));  // names a landmark that the map lacks
-  EXPECT_FALSE(UnpackSights(bytes, 100'000, 3, &read));  // more than an image may see
+  EXPECT_FALSE(UnpackSights(bytes, 99'999, 10, &num_left, &read));  // names a landmark that the map lacks
+  EXPECT_FALSE(UnpackSights(bytes, 100'000, 3, &num_left, &read));  // more than an image may see
 }
 
 }  // namespace

@@ -81,6 +81,11 @@ class PageSights {
   std::array<std::set<int64_t>, 2> reference_;
 };
 
+bool Unpack(std::string_view bytes, int64_t num_landmarks, size_t max_num_seen, SightLists* lists) {
+  int64_t num_left = 1'000'000;
+  return UnpackSights(bytes, num_landmarks, max_num_seen, &num_left, lists);
+}
+
 // What is packed is read, and is what the page says that the bytes are.
 void ExpectDrawn(const SightLists& images) {
   const std::string bytes = PackSights(images);
@@ -91,7 +96,7 @@ void ExpectDrawn(const SightLists& images) {
     most = std::max(most, image.size());
     if (!image.empty()) num_landmarks = std::max<int64_t>(num_landmarks, image.back() + 1);
   }
-  ASSERT_TRUE(UnpackSights(bytes, num_landmarks, most, &read));
+  ASSERT_TRUE(Unpack(bytes, num_landmarks, most, &read));
   EXPECT_EQ(read, images);
   const PageSights page(bytes, images.size());
   EXPECT_EQ(page.num_landmarks(), num_landmarks);
@@ -172,15 +177,26 @@ TEST(PackedSights, ListsBeyondTheLimitsAreRefused) {
   const SightLists images = {{0, 1, 4}, {2}};
   const std::string bytes = PackSights(images);
   SightLists read(2);
-  EXPECT_TRUE(UnpackSights(bytes, 5, 3, &read));
-  EXPECT_TRUE(UnpackSights(bytes, 6, 4, &read));
-  EXPECT_FALSE(UnpackSights(bytes, 4, 3, &read));
-  EXPECT_FALSE(UnpackSights(bytes, 5, 2, &read));
+  EXPECT_TRUE(Unpack(bytes, 5, 3, &read));
+  EXPECT_TRUE(Unpack(bytes, 6, 4, &read));
+  EXPECT_FALSE(Unpack(bytes, 4, 3, &read));
+  EXPECT_FALSE(Unpack(bytes, 5, 2, &read));
   for (size_t size = 0; size < bytes.size(); ++size)
-    EXPECT_FALSE(UnpackSights(bytes.substr(0, size), 5, 3, &read)) << size;
-  EXPECT_FALSE(UnpackSights(bytes + '\0', 5, 3, &read));
+    EXPECT_FALSE(Unpack(bytes.substr(0, size), 5, 3, &read)) << size;
+  EXPECT_FALSE(Unpack(bytes + '\0', 5, 3, &read));
   // A varint of 64 bits, which are negative as a number.
-  EXPECT_FALSE(UnpackSights(std::string(9, '\xff') + '\1' + bytes.substr(1), 5, 3, &read));
+  EXPECT_FALSE(Unpack(std::string(9, '\xff') + '\1' + bytes.substr(1), 5, 3, &read));
+}
+
+TEST(PackedSights, AllTogetherAreNoMoreThanAreLeft) {
+  const SightLists images = {{0, 1, 4}, {2}, {}, {0, 4}};
+  const std::string bytes = PackSights(images);
+  for (const int64_t most : {6, 7, 1000, 5, 4, 3, 2, 0, -1}) {
+    SightLists read(images.size());
+    int64_t num_left = most;
+    EXPECT_EQ(UnpackSights(bytes, 5, 3, &num_left, &read), most >= 6) << most;
+    if (most >= 6) EXPECT_EQ(num_left, most - 6);
+  }
 }
 
 // A reference to an image before the first, in each of the two places.
@@ -194,7 +210,7 @@ TEST(PackedSights, ReferencesBeforeTheFirstImageAreRefused) {
         references[1].Code(encoder, image == 1 && is_second ? back : 0);
       }
       SightLists read(2);
-      EXPECT_EQ(UnpackSights('\0' + encoder.Take(), 0, 1, &read), back == 1);
+      EXPECT_EQ(Unpack('\0' + encoder.Take(), 0, 1, &read), back == 1);
     }
   }
 }
