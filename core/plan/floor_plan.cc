@@ -1,5 +1,6 @@
 #include "core/plan/floor_plan.h"
 
+#include <cmath>
 #include <cstdlib>
 
 namespace cairn {
@@ -20,7 +21,8 @@ bool FloorPlan::Contains(const Eigen::Vector2d& place) const {
 }
 
 Status CheckFloorPlan(const FloorPlan& plan, const std::string& what) {
-  if (!(plan.grid_m > 0) || !plan.origin.allFinite()) return Corrupt(what, "the plan's grid is not a grid");
+  if (!(plan.grid_m > 0) || !std::isfinite(plan.grid_m) || !plan.origin.allFinite())
+    return Corrupt(what, "the plan's grid is not a grid");
   const auto on_grid = [](const GridPoint& point) {
     return std::abs(point.x) <= kMaxGridCoordinate && std::abs(point.y) <= kMaxGridCoordinate;
   };

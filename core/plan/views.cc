@@ -1,6 +1,7 @@
 #include "core/plan/views.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -190,17 +191,35 @@ FaceLocator::FaceLocator(const Views& views) : views_(views) {
   low_ = low;
   const Vec2 size = (high - low).array() + 1;
   cell_ = std::max({std::sqrt(size.x() * size.y() / std::max(1, num_faces)), size.maxCoeff() / 2048, 1.0});
-  num_columns_ = static_cast<int>(size.x() / cell_) + 1;
-  num_rows_ = static_cast<int>(size.y() / cell_) + 1;
-  const auto visit_cells = [&](FaceIdx face, auto&& visit) {
-    Vec2 face_low = Real(views.vertices[views.face_vertices[views.face_offsets[face]]]), face_high = face_low;
-    for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i) {
-      face_low = face_low.cwiseMin(Real(views.vertices[views.face_vertices[i]]));
-      face_high = face_high.cwiseMax(Real(views.vertices[views.face_vertices[i]]));
+  // The cells that each face's corners lie between: first column and row, last column and row.
+  std::vector<std::array<int, 4>> boxes(num_faces);
+  const auto take_cells = [&] {
+    num_columns_ = static_cast<int>(size.x() / cell_) + 1;
+    num_rows_ = static_cast<int>(size.y() / cell_) + 1;
+    int64_t num_entries = 0;
+    for (FaceIdx face = 0; face < num_faces; ++face) {
+      Vec2 face_low = Real(views.vertices[views.face_vertices[views.face_offsets[face]]]),
+           face_high = face_low;
+      for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i) {
+        face_low = face_low.cwiseMin(Real(views.vertices[views.face_vertices[i]]));
+        face_high = face_high.cwiseMax(Real(views.vertices[views.face_vertices[i]]));
+      }
+      const Eigen::Vector2i from = ((face_low - low_) / cell_).cast<int>(),
+                            to = ((face_high - low_) / cell_).cast<int>();
+      boxes[face] = {from.x(), from.y(), to.x(), to.y()};
+      num_entries += int64_t{to.x() - from.x() + 1} * (to.y() - from.y() + 1);
     }
-    const Vec2 from = (face_low - low_) / cell_, to = (face_high - low_) / cell_;
-    for (int row = static_cast<int>(from.y()); row <= static_cast<int>(to.y()); ++row) {
-      for (int column = static_cast<int>(from.x()); column <= static_cast<int>(to.x()); ++column)
+    return num_entries;
+  };
+  // Regions of a real plan lie side by side; any number of a file's may lie over each other.
+  constexpr int64_t kMaxEntries = 16;  // a region or a cell
+  while (take_cells() > kMaxEntries * (num_faces + int64_t{num_columns_} * num_rows_) &&
+         num_columns_ * num_rows_ > 1)
+    cell_ *= 2;
+  const auto visit_cells = [&](FaceIdx face, auto&& visit) {
+    const auto [first_column, first_row, last_column, last_row] = boxes[face];
+    for (int row = first_row; row <= last_row; ++row) {
+      for (int column = first_column; column <= last_column; ++column)
         visit(static_cast<size_t>(row) * num_columns_ + column);
     }
   };

@@ -82,6 +82,8 @@ class FaceLocator {
   FaceIdx Find(const Eigen::Vector2d& place) const;
   // Distance to the nearest border or wall of the region, metres, negative outside.
   double BorderDistance(FaceIdx face, const Eigen::Vector2d& place) const;
+  // How many cells all regions together lie in, whatever a file says of them: at most 16 a region and a cell.
+  int64_t num_entries() const { return static_cast<int64_t>(faces_.size()); }
 
  private:
   const Views& views_;

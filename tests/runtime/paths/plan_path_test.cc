@@ -243,5 +243,26 @@ TEST(FaceLocator, APointOnABorderIsInARegion) {
   }
 }
 
+// Regions of a file may lie over each other, all of them over the whole plan.
+TEST(FaceLocator, RegionsOverEachOtherTakeNoMoreRoomThanThereIs) {
+  Views views = decompose_views::Decomposed("0,0,7,0\n7,0,7,7\n7,7,0,7\n0,7,0,0").views;
+  ASSERT_GE(views.num_faces(), 1);
+  const std::vector<int32_t> corners(views.face_vertices.begin(),
+                                     views.face_vertices.begin() + views.face_offsets[1]);
+  constexpr FaceIdx kNumFaces = 3000;
+  views.face_vertices.clear();
+  views.face_offsets = {0};
+  views.parents.assign(kNumFaces, -1);
+  for (FaceIdx face = 0; face < kNumFaces; ++face) {
+    views.face_vertices.insert(views.face_vertices.end(), corners.begin(), corners.end());
+    views.face_offsets.push_back(std::ssize(views.face_vertices));
+  }
+  const FaceLocator locator(views);
+  EXPECT_GE(locator.num_entries(), kNumFaces);
+  EXPECT_LE(locator.num_entries(), 32 * kNumFaces);
+  EXPECT_EQ(locator.Find({3, 4}), 0);
+  EXPECT_EQ(locator.Find({8, 4}), -1);
+}
+
 }  // namespace
 }  // namespace cairn
