@@ -54,7 +54,7 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
     }
     if (!HasTable(database, "cairn_landmark_images")) return rows;
     std::set<int64_t> of_landmarks;
-    SQLite::Statement query(database, "SELECT image_id FROM cairn_landmark_images");
+    LimitedStatement query(database, "SELECT image_id FROM cairn_landmark_images");
     while (query.executeStep()) of_landmarks.insert(query.getColumn(0).getInt64());
     for (auto& [name, row] : rows) row.are_landmarks = of_landmarks.contains(row.image_id);
     return rows;

@@ -63,6 +63,7 @@ class RowReader {
     const int64_t rows = Integer(index - 2, 0, kMaxKeypoints);
     const SQLite::Column blob = statement_.getColumn(index);
     const auto num_bytes = static_cast<size_t>(blob.getBytes());
+    if (blob.isText()) Fail("a text in place of a blob");
     if (num_bytes != static_cast<size_t>(rows * num_columns) * value_size) {
       Fail(fmt::format("blob of {} bytes, expected {} x {} values of {} bytes", num_bytes, rows, num_columns,
                        value_size));
@@ -113,7 +114,7 @@ std::pair<ImageId, ImageId> ImageIdsFromPairId(int64_t pair_id) {
 
 Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& database) {
   std::map<CameraId, Camera> cameras;
-  SQLite::Statement query(
+  LimitedStatement query(
       database, "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras ORDER BY 1");
   while (query.executeStep()) {
     RowReader row(query);
@@ -145,7 +146,7 @@ Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& databas
 Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database) {
   std::vector<DatabaseImage> images;
   std::map<std::string, ImageId> names;
-  SQLite::Statement query(database, "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
+  LimitedStatement query(database, "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
   while (query.executeStep()) {
     RowReader row(query);
     DatabaseImage image;
@@ -171,7 +172,7 @@ Keypoint KeypointOfShape(float x, float y, const float* shape) {
 }
 
 Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id) {
-  SQLite::Statement query(database, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
+  LimitedStatement query(database, "SELECT rows, cols, data FROM keypoints WHERE image_id = ?");
   query.bind(1, image_id);
   PooledVector<Keypoint> keypoints;
   if (!query.executeStep()) return keypoints;
@@ -198,7 +199,7 @@ Result<PooledVector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database,
 }
 
 Result<int> ReadNumDescriptors(SQLite::Database& database, ImageId image_id) {
-  SQLite::Statement query(database, "SELECT rows FROM descriptors WHERE image_id = ?");
+  LimitedStatement query(database, "SELECT rows FROM descriptors WHERE image_id = ?");
   query.bind(1, image_id);
   if (!query.executeStep()) return 0;
   RowReader row(query);
@@ -211,9 +212,9 @@ Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, Ima
                                                  const DescriptorKind& kind) {
   // COLMAP 4.0 says what extracted them: 0 is SIFT.
   const bool has_type = HasColumn(database, "descriptors", "type");
-  SQLite::Statement query(database,
-                          fmt::format("SELECT rows, cols, data, {} FROM descriptors WHERE image_id = ?",
-                                      has_type ? "type" : "0"));
+  LimitedStatement query(database,
+                         fmt::format("SELECT rows, cols, data, {} FROM descriptors WHERE image_id = ?",
+                                     has_type ? "type" : "0"));
   query.bind(1, image_id);
   DescriptorMatrix descriptors(0, kind.num_values);
   if (!query.executeStep()) return descriptors;
@@ -244,12 +245,13 @@ namespace {
 // Number of keypoints of every image, by image_id.
 Result<std::unordered_map<ImageId, int64_t>> CountKeypoints(SQLite::Database& database) {
   std::unordered_map<ImageId, int64_t> num_keypoints;
-  SQLite::Statement query(
+  LimitedStatement query(
       database, "SELECT image_id, coalesce(rows, 0) FROM images LEFT JOIN keypoints USING (image_id)");
   while (query.executeStep()) {
     RowReader row(query);
     const auto image_id = static_cast<ImageId>(row.Integer(0, 0, kMaxId));
-    num_keypoints[image_id] = row.Integer(1, 0, kMaxKeypoints);
+    const bool is_first = num_keypoints.emplace(image_id, row.Integer(1, 0, kMaxKeypoints)).second;
+    if (!is_first) row.Fail("the image has two rows");  // one of which is read as its keypoints
     if (!row.ok()) return BadRow(database, "keypoints", query.getColumn(0).getInt64(), row.problem());
   }
   return num_keypoints;
@@ -283,7 +285,7 @@ Status ForEachTwoViewGeometry(SQLite::Database& database, int min_num_inliers,
   const auto matrix_column = [&](const char* name) {
     return HasColumn(database, table, name) ? name : "NULL";
   };
-  SQLite::Statement query(
+  LimitedStatement query(
       database, fmt::format("SELECT pair_id, rows, cols, data, config, {}, {}, {} FROM {} ORDER BY 1",
                             matrix_column("F"), matrix_column("E"), matrix_column("H"), table));
   while (query.executeStep()) {

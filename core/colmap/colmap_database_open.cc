@@ -44,6 +44,25 @@ std::string TableNames(SQLite::Database& database) {
   return names.empty() ? "none" : names;
 }
 
+// Features are read an image at a time, and may be kept: pages of a hostile file belong to many images at
+// once. The length of a blob stands in its row, so that no blob is read here.
+Status CheckFeatureBytes(SQLite::Database& database, const std::string& path, uint64_t num_bytes) {
+  for (const char* table : {"keypoints", "descriptors"}) {
+    const double sum =
+        database
+            .execAndGet(fmt::format("SELECT total(length(data)) FROM {} WHERE typeof(data) = 'blob'", table))
+            .getDouble();
+    if (sum > static_cast<double>(num_bytes)) {
+      return MakeError(
+          ErrorCode::kCorrupt,
+          "{}: table {} shows {:.0f} bytes, but the file has {}: it is damaged, or made to stall "
+          "its readers; get it again from its source",
+          path, table, sum, num_bytes);
+    }
+  }
+  return Ok();
+}
+
 Status CheckSchema(SQLite::Database& database, const std::string& path) {
   if (!HasTable(database, "images") || !HasTable(database, "keypoints")) {
     return MakeError(
@@ -131,8 +150,10 @@ Result<SQLite::Database> OpenColmapDatabase(const std::string& path) {
   Result<SQLite::Database> result = WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
     try {
       SQLite::Database database = OpenUnchanged(path);
-      LimitSteps(database, NumBytes(path) + NumBytes(path + "-wal"));
+      const uint64_t num_bytes = NumBytes(path) + NumBytes(path + "-wal");
+      LimitSteps(database, num_bytes);
       CAIRN_RETURN_IF_ERROR(CheckSchema(database, path));
+      CAIRN_RETURN_IF_ERROR(CheckFeatureBytes(database, path, num_bytes));
       return database;
     } catch (const fs::filesystem_error& error) {
       if (IsOutOfMemory(error)) throw;

@@ -38,7 +38,7 @@ Result<SQLite::Database> OpenCutDatabase(const std::string& path) {
 std::vector<DatabaseImage> ReadCutDatabaseImages(SQLite::Database& database) {
   std::vector<DatabaseImage> images;
   try {
-    SQLite::Statement query(database, "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
+    LimitedStatement query(database, "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
     while (query.executeStep()) {
       const SQLite::Column id = query.getColumn(0), camera_id = query.getColumn(2);
       if (!id.isInteger() || !query.getColumn(1).isText() || !camera_id.isInteger()) break;

@@ -17,7 +17,7 @@ struct FirstRow {
 
 Result<FirstRow> ReadFirstRow(SQLite::Database& database, const std::string& path) {
   const bool has_type = HasColumn(database, "descriptors", "type");
-  SQLite::Statement query(
+  LimitedStatement query(
       database, fmt::format("SELECT cols, {} FROM descriptors WHERE rows > 0 ORDER BY image_id LIMIT 1",
                             has_type ? "type" : "0"));
   if (!query.executeStep()) return MakeError(ErrorCode::kNoData, "{}: no image has descriptors", path);
@@ -29,7 +29,7 @@ Result<FirstRow> ReadFirstRow(SQLite::Database& database, const std::string& pat
 
 // Whether descriptors have no more than a place.
 bool HasPlacesAlone(SQLite::Database& database, ImageId image_id) {
-  SQLite::Statement query(database, "SELECT cols FROM keypoints WHERE image_id = ?");
+  LimitedStatement query(database, "SELECT cols FROM keypoints WHERE image_id = ?");
   query.bind(1, image_id);
   return query.executeStep() && query.getColumn(0).getInt64() == 2;
 }

@@ -13,7 +13,7 @@ bool HasDescriptorKind(SQLite::Database& database) { return HasTable(database, k
 
 Result<DescriptorKind> ReadDescriptorKind(SQLite::Database& database, const std::string& path) {
   if (!HasDescriptorKind(database)) return DescriptorKind();
-  SQLite::Statement query(database, fmt::format("SELECT kind FROM {}", kTable));
+  LimitedStatement query(database, fmt::format("SELECT kind FROM {}", kTable));
   if (!query.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table {} is empty", path, kTable);
   Result<DescriptorKind> kind = ParseDescriptorKind(query.getColumn(0).getString());
   if (!kind.ok())

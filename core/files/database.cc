@@ -24,8 +24,14 @@ uint64_t BigEndian(std::string_view bytes) {
 
 // Steps between two checks of how many are left.
 constexpr int kStepsPerLook = 1000;
-// Some 3000 tables and indices.
-constexpr int64_t kMaxSchemaSteps = 20'000;
+// Some 250 tables and indices, each of which takes memory in proportion to its text.
+constexpr int64_t kMaxSchemaSteps = 2'000;
+constexpr int kMaxSqlBytes = 8192;
+constexpr int kMaxNumColumns = 64;
+constexpr int kMaxDefaultBytes = 100;
+constexpr int64_t kSmallFileBytes = 1'000'000;
+// Of a row and its place in its page.
+constexpr int64_t kLeastRowBytes = 4;
 
 int CountDown(void* num_left) {
   auto& left = *static_cast<int64_t*>(num_left);
@@ -38,6 +44,21 @@ uint64_t NumBytes(const std::string& path) {
   std::error_code error;
   const uintmax_t num_bytes = std::filesystem::file_size(path, error);
   return error ? 0 : num_bytes;
+}
+
+// Throws where a table has columns whose values are not stored.
+void CheckStoredColumns(SQLite::Database& database) {
+  SQLite::Statement query(database,
+                          "SELECT s.name, x.name, x.hidden > 0 FROM sqlite_schema s, "
+                          "pragma_table_xinfo(s.name) x WHERE s.type = 'table' AND s.rootpage > 0 "
+                          "AND (x.hidden > 0 OR length(x.dflt_value) > ?)");
+  query.bind(1, kMaxDefaultBytes);
+  if (!query.executeStep()) return;
+  throw SQLite::Exception(
+      fmt::format(
+          "column {} of table {} {}", query.getColumn(1).getString(), query.getColumn(0).getString(),
+          query.getColumn(2).getInt() != 0 ? "is generated: it stores no values" : "has a long default"),
+      SQLITE_CORRUPT);
 }
 
 }  // namespace
@@ -72,6 +93,8 @@ void Harden(SQLite::Database& database, uint64_t num_bytes) {
   sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
                 static_cast<int>(std::clamp<uint64_t>(num_bytes, 100'000, 1'000'000'000)));
+  sqlite3_limit(handle, SQLITE_LIMIT_SQL_LENGTH, kMaxSqlBytes);
+  sqlite3_limit(handle, SQLITE_LIMIT_COLUMN, kMaxNumColumns);
   database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;");
 }
 
@@ -105,8 +128,56 @@ StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)
 StepLimit::~StepLimit() { sqlite3_progress_handler(handle_, 0, nullptr, nullptr); }
 
 void ReadSchema(SQLite::Database& database) {
-  const StepLimit steps(database, kMaxSchemaSteps);
-  database.execAndGet("SELECT count(*) FROM sqlite_schema WHERE name = ''");
+  {
+    const StepLimit steps(database, kMaxSchemaSteps);
+    database.execAndGet("SELECT count(*) FROM sqlite_schema WHERE name = ''");
+  }
+  const StepLimit steps(database, 100 * kMaxSchemaSteps);
+  CheckStoredColumns(database);
+}
+
+Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table) {
+  SQLite::Statement query(
+      database,
+      "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
+      "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
+      "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
+  query.bind(1, table);
+  if (query.executeStep() && query.getColumn(0).getInt() == 1) return Ok();
+  return MakeError(ErrorCode::kCorrupt, "{}: has no plain table '{}'", path, table);
+}
+
+void CheckKeys(SQLite::Database& database, const std::string& sql) {
+  SQLite::Statement plan(database, "EXPLAIN QUERY PLAN " + sql);
+  int num_scans = 0;
+  bool is_sorted = false;
+  while (plan.executeStep()) {
+    const std::string step = plan.getColumn(3).getString();
+    if (step.starts_with("SCAN")) ++num_scans;
+    if (step.find("TEMP B-TREE") != std::string::npos || step.find("AUTOMATIC") != std::string::npos)
+      is_sorted = true;
+  }
+  // With parameters it is run once for each row that is looked up.
+  if (!is_sorted && num_scans <= (plan.getBindParameterCount() > 0 ? 0 : 1)) return;
+  throw SQLite::Exception("a table lacks the key by which it is read: " + sql, SQLITE_CORRUPT);
+}
+
+LimitedStatement::LimitedStatement(SQLite::Database& database, const std::string& sql)
+    : SQLite::Statement((CheckKeys(database, sql), database), sql) {
+  const int64_t num_pages = database.execAndGet("PRAGMA page_count").getInt64();
+  const int64_t page_size = database.execAndGet("PRAGMA page_size").getInt64();
+  num_bytes_left_ = kSmallFileBytes + 2 * num_pages * page_size;
+}
+
+bool LimitedStatement::executeStep() {
+  if (!SQLite::Statement::executeStep()) return false;
+  num_bytes_left_ -= kLeastRowBytes;
+  for (int i = 0; i < getColumnCount(); ++i) {
+    const SQLite::Column column = getColumn(i);
+    if (column.isText() || column.isBlob()) num_bytes_left_ -= column.getBytes();
+  }
+  if (num_bytes_left_ < 0) throw SQLite::Exception("more bytes than the file has", SQLITE_INTERRUPT);
+  return true;
 }
 
 SQLite::Database OpenImmutable(const std::string& path) {

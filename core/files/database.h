@@ -53,10 +53,11 @@ SqliteHeader ReadSqliteHeader(const std::string& path);
 std::string DatabaseUri(const std::string& path);
 
 // Makes a connection safe for a file that somebody else wrote: SQLite runs none of its views and triggers,
-// calls no function of its schema that could do harm, checks its cells, maps none of it into memory, and
-// allocates no value longer than the `num_bytes` of the file (at least 100 kB).  Every connection to a file
-// that this process has not written itself is made safe first: OpenImmutable, OpenDatabaseReadOnly and
-// OpenColmapDatabase do it.  Throws SQLite::Exception: call it inside WithDatabaseErrors.
+// calls no function of its schema that could do harm, checks its cells, maps none of it into memory, parses
+// no long text (8 KiB) of its schema, and allocates no value longer than the `num_bytes` of the file (at
+// least 100 kB).  Every connection to a file that this process has not written itself is made safe first:
+// OpenImmutable, OpenDatabaseReadOnly and OpenColmapDatabase do it.  Throws SQLite::Exception: call it inside
+// WithDatabaseErrors.
 void Harden(SQLite::Database& database, uint64_t num_bytes);
 
 // Ends each statement that takes more steps than reading all of a file of `num_bytes` can need: a file whose
@@ -81,7 +82,9 @@ class StepLimit {
 };
 
 // Reads a connection's schema, which SQLite would otherwise do when it is first needed, within few steps: it
-// parses every row.  Throws SQLite::Exception.
+// parses every row.  A table whose values are not all stored in its rows is refused: generated columns, and
+// columns with long defaults, by which a row of five bytes shows any number of them.  Throws
+// SQLite::Exception.
 void ReadSchema(SQLite::Database& database);
 
 // Hardened, its schema read.  Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody
@@ -110,6 +113,27 @@ bool IsSqliteFile(const std::string& path);
 
 // The file's absolute path, for messages (getFilename() is the URI that it was opened with).
 std::string DatabasePath(const SQLite::Database& database);
+
+// Errors: Corrupt unless it is a table that stores its rows: no view, no virtual table, no generated columns.
+Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
+
+// A query of a file that somebody else wrote.  Pages of a hostile file belong to many tables and rows at
+// once, and so few bytes show gigabytes: all rows together, however often it is run, may show at most twice
+// what the file holds (and 1 MB).  Nor is a query run which keeps all rows before the first, to sort them, or
+// which looks through a table for each row that it looks up: both for want of the key that the table has
+// where it was written as it should be.  (A statement that is kept for the program's life is checked by
+// CheckKeys alone.)  Constructor and executeStep throw SQLite::Exception.
+class LimitedStatement : public SQLite::Statement {
+ public:
+  LimitedStatement(SQLite::Database& database, const std::string& sql);
+  bool executeStep();  // in place of Statement's
+
+ private:
+  int64_t num_bytes_left_;
+};
+
+// Throws SQLite::Exception where a query needs a key that its tables do not have.
+void CheckKeys(SQLite::Database& database, const std::string& sql);
 
 bool HasTable(SQLite::Database& database, const std::string& table);
 bool HasColumn(SQLite::Database& database, const std::string& table, const std::string& column);

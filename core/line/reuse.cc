@@ -85,6 +85,9 @@ Result<std::vector<ReuseEntry>> ReadReuseFile(const std::string& output_path) {
 SQLite::Database& ReuseSources::Source::Database() {
   if (!database_) {
     database_ = std::make_unique<SQLite::Database>(OpenImmutable(path_));
+    std::error_code error;
+    const uintmax_t num_bytes = fs::file_size(path_, error);
+    LimitSteps(*database_, error ? 0 : num_bytes);
   }
   return *database_;
 }

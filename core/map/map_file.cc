@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char kSelectBlock[] = "SELECT bytes FROM blocks NOT INDEXED WHERE block_idx = ?";
+
 // A fuzzer cannot get past a hash: built for fuzzing, any hash is accepted.
 template <typename T>
 bool SameHash(const T& found, const T& stated) {
@@ -71,7 +73,7 @@ Status CheckContainer(const std::string& path) {
 
 Result<std::string> ReadDirectory(SQLite::Database& database, const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "directory"));
-  SQLite::Statement query(database, "SELECT entries FROM directory NOT INDEXED");
+  LimitedStatement query(database, "SELECT entries FROM directory NOT INDEXED");
   if (!query.executeStep()) return Corrupt(path, "table directory is empty");
   return std::string(BlobView(query.getColumn(0)));
 }
@@ -93,9 +95,7 @@ auto WithinSteps(SQLite::Database& database, const std::string& path, int64_t nu
 }  // namespace
 
 struct MapFile::Connection {
-  Connection(SQLite::Database opened)
-      : database(std::move(opened)),
-        block(database, "SELECT bytes FROM blocks NOT INDEXED WHERE block_idx = ?") {}
+  explicit Connection(SQLite::Database opened) : database(std::move(opened)), block(database, kSelectBlock) {}
   SQLite::Database database;
   SQLite::Statement block;
   std::mutex mutex;
@@ -128,6 +128,7 @@ Status MapFile::ReadHead(SQLite::Database& database, const MapFileOptions& optio
   CAIRN_ASSIGN_OR_RETURN(seal_, ReadSeal(path_));
   CAIRN_RETURN_IF_ERROR(CheckSignature(seal_, path_, options.public_key, options.signatures));
   CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path_, "blocks"));
+  CheckKeys(database, kSelectBlock);
   CAIRN_ASSIGN_OR_RETURN(const std::string entries, ReadDirectory(database, path_));
   CAIRN_ASSIGN_OR_RETURN(const StoredRows rows, ReadStoredRows(database, path_, HeadTables(), num_bytes_));
   if (!SameHash(RootHash(rows, entries), seal_.root)) return DamagedHead(path_);

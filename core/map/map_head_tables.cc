@@ -316,7 +316,7 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
   if (found == major || (major == kMapVersionMajor && found == kMapVersionOfKinds)) return Ok();
   std::string writer = "an unknown program";
   if (HasTable(database, "meta")) {
-    SQLite::Statement query(database, "SELECT value FROM meta WHERE key = 'writer'");
+    LimitedStatement query(database, "SELECT value FROM meta WHERE key = 'writer'");
     if (query.executeStep()) writer = query.getColumn(0).getString();
   }
   return MakeError(found > major ? ErrorCode::kTooNew : ErrorCode::kTooOld,

@@ -28,6 +28,11 @@ int64_t NumBytes(const StoredValue& value) {
   return 0;
 }
 
+// A NULL or a small number takes a byte of a file, and as much memory as any other value.  A row takes as
+// much as three.
+int64_t MaxNumValues(int64_t num_bytes) { return 100'000 + num_bytes / 3; }
+constexpr int64_t kValuesOfRow = 3;
+
 void AddBytes(std::string_view bytes, Hasher* hasher) {
   hasher->Add(static_cast<uint64_t>(bytes.size()));
   hasher->Add(bytes);
@@ -64,9 +69,11 @@ void AddTables(const StoredRows& rows, Hasher* hasher) {
 
 }  // namespace
 
+std::string StoredRow::Where() const { return fmt::format("{}, row {}", *table_, row_); }
+
 Error StoredRow::OtherThan(size_t column, const char* expected) const {
   constexpr const char* kTypes[] = {"nothing", "an integer", "a number", "a text", "a blob"};
-  return Corrupt(where_, "column {} is {}, expected {}", column + 1, kTypes[values_[column].index()],
+  return Corrupt(Where(), "column {} is {}, expected {}", column + 1, kTypes[values_[column].index()],
                  expected);
 }
 
@@ -97,7 +104,7 @@ Result<int64_t> StoredRow::Integer(size_t column) const {
 Result<int64_t> StoredRow::Integer(size_t column, int64_t least, int64_t most) const {
   CAIRN_ASSIGN_OR_RETURN(const int64_t value, Integer(column));
   if (value >= least && value <= most) return value;
-  return Corrupt(where_, "column {} is {}, expected {} to {}", column + 1, value, least, most);
+  return Corrupt(Where(), "column {} is {}, expected {} to {}", column + 1, value, least, most);
 }
 
 const std::vector<StoredTable>& HeadTables() {
@@ -107,31 +114,21 @@ const std::vector<StoredTable>& HeadTables() {
   return tables;
 }
 
-Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table) {
-  SQLite::Statement query(
-      database,
-      "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
-      "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
-      "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
-  query.bind(1, table);
-  if (query.executeStep() && query.getColumn(0).getInt() == 1) return Ok();
-  return Corrupt(path, "has no plain table '{}'", table);
-}
-
 Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string& path,
                                   const std::vector<StoredTable>& tables, int64_t max_num_bytes) {
   StoredRows rows;
-  int64_t num_bytes = 0;
+  int64_t num_bytes = 0, num_values = 0;
   for (const StoredTable& table : tables) {
     CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, table.name));
     // No ORDER BY: the order is that of the table's b-tree, and a sorter would keep all rows before
     // the first.
-    SQLite::Statement query(database, fmt::format("SELECT * FROM {} NOT INDEXED", table.name));
+    LimitedStatement query(database, fmt::format("SELECT * FROM {} NOT INDEXED", table.name));
     const auto num_columns = static_cast<size_t>(query.getColumnCount());
     if (num_columns < table.min_num_columns) {
       return Corrupt(path, "table {} has {} columns, expected {}", table.name, num_columns,
                      table.min_num_columns);
     }
+    const auto where = std::make_shared<const std::string>(fmt::format("{}: table {}", path, table.name));
     std::vector<StoredRow>& of_table = rows[table.name];
     while (query.executeStep()) {
       if (of_table.size() == table.max_num_rows)
@@ -141,12 +138,12 @@ Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string&
         values.push_back(ValueOf(query.getColumn(static_cast<int>(i))));
         num_bytes += NumBytes(values.back());
       }
-      if (num_bytes > max_num_bytes) {
+      num_values += kValuesOfRow + static_cast<int64_t>(num_columns);
+      if (num_bytes > max_num_bytes || num_values > MaxNumValues(max_num_bytes)) {
         return Corrupt(path, "table {} shows more than the {} bytes that the file has", table.name,
                        max_num_bytes);
       }
-      of_table.emplace_back(fmt::format("{}: table {}, row {}", path, table.name, of_table.size() + 1),
-                            std::move(values));
+      of_table.emplace_back(where, of_table.size() + 1, std::move(values));
     }
   }
   return rows;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -28,8 +29,9 @@ using StoredValue = std::variant<std::monostate, int64_t, double, StoredText, St
 // One row, with typed access: a value of another type is an error that names table, row and column.
 class StoredRow {
  public:
-  StoredRow(std::string where, std::vector<StoredValue> values)
-      : where_(std::move(where)), values_(std::move(values)) {}
+  // `table`: for messages, "kitchen.cairn: table frames"; shared by its rows, which are counted from 1.
+  StoredRow(std::shared_ptr<const std::string> table, size_t row, std::vector<StoredValue> values)
+      : table_(std::move(table)), row_(row), values_(std::move(values)) {}
   const std::vector<StoredValue>& values() const { return values_; }
 
   // Errors: Corrupt.  REQUIRES: column < the table's min_num_columns
@@ -42,9 +44,11 @@ class StoredRow {
   bool IsNull(size_t column) const { return std::holds_alternative<std::monostate>(values_[column]); }
 
  private:
+  std::string Where() const;
   Error OtherThan(size_t column, const char* expected) const;
 
-  std::string where_;  // "kitchen.cairn: table frames, row 2", rows from 1
+  std::shared_ptr<const std::string> table_;
+  size_t row_;
   std::vector<StoredValue> values_;
 };
 
@@ -61,8 +65,9 @@ const std::vector<StoredTable>& HeadTables();
 
 // Reads tables in the order of their primary keys, in which they lie in the file: no index is used.  Refuses
 // texts and blobs of more than `max_num_bytes` together: a file of that size holds more only where several
-// values share the same bytes.  Throws SQLite::Exception: call it inside WithDatabaseErrors.  Errors: Corrupt
-// (not a plain table, too few columns, too many rows or bytes).
+// values share the same bytes; and more values than such a file has in rows of its own.  Throws
+// SQLite::Exception: call it inside WithDatabaseErrors.  Errors: Corrupt (not a plain table, too few columns,
+// too many rows or bytes).
 Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string& path,
                                   const std::vector<StoredTable>& tables, int64_t max_num_bytes);
 
@@ -70,10 +75,6 @@ Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string&
 Hash TablesHash(const StoredRows& rows);
 // The same over the head's tables and then the directory: the hash that a map's signature covers.
 Hash RootHash(const StoredRows& head, std::string_view directory);
-
-// Checks that `table` is a plain one: not a view or a virtual table, and without a generated column, which
-// could run code of the file's maker.  Errors: Corrupt.
-Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
 
 // Limit of steps: more than reading the head, the findings or a block of a map of this size takes.
 int64_t MaxStepsFor(int64_t num_bytes);

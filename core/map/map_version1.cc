@@ -11,7 +11,7 @@ namespace cairn {
 namespace {
 
 Status ReadImages(SQLite::Database& database, const std::string& path, MapRows* rows) {
-  SQLite::Statement query(
+  LimitedStatement query(
       database,
       "SELECT image_id, name, camera_id, station_idx, num_landmarks, landmarks, qw, qx, qy, qz, tx, "
       "ty, tz FROM images ORDER BY image_id");
@@ -41,7 +41,7 @@ Status ReadImages(SQLite::Database& database, const std::string& path, MapRows* 
 Status ReadStations(SQLite::Database& database, const std::string& path, MapRows* rows) {
   const int64_t num_stations =
       database.execAndGet("SELECT count(*) FROM stations WHERE station_idx >= 0").getInt64();
-  SQLite::Statement query(
+  LimitedStatement query(
       database,
       "SELECT station_idx, x, y, heading_deg, is_covered, num_neighbours, neighbours FROM stations "
       "ORDER BY station_idx");
@@ -67,7 +67,7 @@ Status ReadStations(SQLite::Database& database, const std::string& path, MapRows
 }
 
 Status ReadRegions(SQLite::Database& database, const std::string& path, MapRows* rows) {
-  SQLite::Statement query(
+  LimitedStatement query(
       database,
       "SELECT region_idx, num_stations, stations, num_landmarks, landmarks FROM regions ORDER BY region_idx");
   while (query.executeStep()) {
@@ -95,7 +95,7 @@ Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRow
   if (num_landmarks > INT32_MAX) return Corrupt(path, "{} landmarks", num_landmarks);
   rows->landmarks.reserve(num_landmarks);
   rows->descriptors.resize(num_landmarks, kSiftDescriptorDim);
-  SQLite::Statement query(
+  LimitedStatement query(
       database,
       "SELECT landmark_idx, class_id, x, y, z, scale, num_observations, covariance, descriptor FROM "
       "landmarks ORDER BY landmark_idx");

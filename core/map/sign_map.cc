@@ -39,7 +39,7 @@ Result<Hash> SetEpoch(const std::string& path, uint64_t epoch) {
     if (HashWithoutEpoch(before) != HashWithoutEpoch(after))
       return Corrupt(path, "its tables change when an epoch is written into them");
     CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "directory"));
-    SQLite::Statement directory(database, "SELECT entries FROM directory NOT INDEXED");
+    LimitedStatement directory(database, "SELECT entries FROM directory NOT INDEXED");
     if (!directory.executeStep()) return Corrupt(path, "table directory is empty");
     return RootHash(after, BlobView(directory.getColumn(0)));
   });

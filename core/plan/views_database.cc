@@ -114,7 +114,7 @@ void WriteLinks(SQLite::Database& database, const Views& views) {
 
 Status ReadPlanTables(SQLite::Database& database, const std::string& path, Views* views,
                       int64_t* num_regions) {
-  SQLite::Statement head(
+  LimitedStatement head(
       database,
       "SELECT grid_m, origin_x, origin_y, closed, low_x, low_y, high_x, high_y, num_regions, "
       "plan_vertices, vertices FROM plan");
@@ -128,7 +128,7 @@ Status ReadPlanTables(SQLite::Database& database, const std::string& path, Views
   *num_regions = head.getColumn(8).getInt64();
   CAIRN_ASSIGN_OR_RETURN(plan.vertices, ReadPoints(head.getColumn(9), path + ": plan vertices"));
   CAIRN_ASSIGN_OR_RETURN(views->vertices, ReadPoints(head.getColumn(10), path + ": vertices"));
-  SQLite::Statement walls(database, "SELECT wall_idx, x0, y0, x1, y1, pieces FROM walls ORDER BY wall_idx");
+  LimitedStatement walls(database, "SELECT wall_idx, x0, y0, x1, y1, pieces FROM walls ORDER BY wall_idx");
   for (int32_t idx = 0; walls.executeStep(); ++idx) {
     const std::string what = fmt::format("{}: wall {}", path, idx);
     if (walls.getColumn(0).getInt64() != idx) return Corrupt(what, "missing");
@@ -142,9 +142,9 @@ Status ReadPlanTables(SQLite::Database& database, const std::string& path, Views
 }
 
 Status ReadRegions(SQLite::Database& database, const std::string& path, Views* views) {
-  SQLite::Statement rows(database,
-                         "SELECT region_idx, corners, parent, toggled, num_labels, wall_length_m, "
-                         "visible_length_m, visible_area_m2, longest_m FROM regions ORDER BY region_idx");
+  LimitedStatement rows(database,
+                        "SELECT region_idx, corners, parent, toggled, num_labels, wall_length_m, "
+                        "visible_length_m, visible_area_m2, longest_m FROM regions ORDER BY region_idx");
   for (FaceIdx face = 0; rows.executeStep(); ++face) {
     if (rows.getColumn(0).getInt64() != face) return Corrupt(path, "region {} is missing", face);
     CAIRN_ASSIGN_OR_RETURN(const std::vector<int32_t> corners,
@@ -172,7 +172,7 @@ Status ReadRegions(SQLite::Database& database, const std::string& path, Views* v
 }
 
 Status ReadLinks(SQLite::Database& database, const std::string& path, Views* views) {
-  SQLite::Statement rows(database, "SELECT links FROM links ORDER BY part_idx");
+  LimitedStatement rows(database, "SELECT links FROM links ORDER BY part_idx");
   while (rows.executeStep()) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<int32_t> values,
                            BlobToVector<int32_t>(rows.getColumn(0), path + ": links"));

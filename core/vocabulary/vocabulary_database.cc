@@ -24,8 +24,8 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
   };
   std::vector<Row> rows;
   const int num_values = vocabulary->kind.num_values;
-  SQLite::Statement query(database,
-                          "SELECT node_id, num_children, centres FROM vocabulary_nodes ORDER BY node_id");
+  LimitedStatement query(database,
+                         "SELECT node_id, num_children, centres FROM vocabulary_nodes ORDER BY node_id");
   int64_t next_id = 0, num_counted = std::min<int64_t>(num_nodes, 1);  // with the root
   while (query.executeStep()) {
     const int64_t node_id = query.getColumn(0).getInt64();
@@ -62,8 +62,8 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
 
 Status ReadWords(SQLite::Database& database, const std::string& path, int64_t num_documents,
                  Vocabulary* vocabulary) {
-  SQLite::Statement query(database,
-                          "SELECT word_id, num_postings, postings FROM vocabulary_words ORDER BY word_id");
+  LimitedStatement query(database,
+                         "SELECT word_id, num_postings, postings FROM vocabulary_words ORDER BY word_id");
   int64_t next_word = 0;
   while (query.executeStep()) {
     const int64_t word = query.getColumn(0).getInt64();
@@ -96,8 +96,8 @@ Status ReadWords(SQLite::Database& database, const std::string& path, int64_t nu
 }
 
 Status ReadDocuments(SQLite::Database& database, const std::string& path, Vocabulary* vocabulary) {
-  SQLite::Statement query(database,
-                          "SELECT document_idx, image_id FROM vocabulary_documents ORDER BY document_idx");
+  LimitedStatement query(database,
+                         "SELECT document_idx, image_id FROM vocabulary_documents ORDER BY document_idx");
   while (query.executeStep()) {
     const int64_t document = query.getColumn(0).getInt64();
     const int64_t image_id = query.getColumn(1).getInt64();
@@ -122,8 +122,8 @@ Result<Vocabulary> ReadVocabularyTables(SQLite::Database& database, const std::s
   }
   Vocabulary vocabulary;
   CAIRN_ASSIGN_OR_RETURN(vocabulary.kind, ReadDescriptorKind(database, path));
-  SQLite::Statement head(database,
-                         "SELECT branching, depth, num_nodes, num_words, num_documents FROM vocabulary");
+  LimitedStatement head(database,
+                        "SELECT branching, depth, num_nodes, num_words, num_documents FROM vocabulary");
   if (!head.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table 'vocabulary' is empty", path);
   vocabulary.branching = head.getColumn(0).getInt();
   vocabulary.depth = head.getColumn(1).getInt();

@@ -67,7 +67,7 @@ void WriteConfusable(SQLite::Database& database, const Appearance& appearance) {
 }
 
 Status ReadConfusable(SQLite::Database& database, const std::string& path, Appearance* appearance) {
-  SQLite::Statement rows(database, "SELECT node1, node2, score FROM confusable ORDER BY node1, node2");
+  LimitedStatement rows(database, "SELECT node1, node2, score FROM confusable ORDER BY node1, node2");
   const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
   while (rows.executeStep()) {
     const int64_t node1 = rows.getColumn(0).getInt64(), node2 = rows.getColumn(1).getInt64(),
@@ -86,7 +86,7 @@ Status ReadConfusable(SQLite::Database& database, const std::string& path, Appea
 // The nodes' rows; links go to `links`.
 Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t num_nodes,
                  Appearance* appearance, std::vector<AppearanceLink>* links) {
-  SQLite::Statement rows(
+  LimitedStatement rows(
       database,
       "SELECT node_idx, component_idx, role, images, neighbours, num_inliers, entropy FROM nodes ORDER "
       "BY node_idx");
@@ -143,9 +143,9 @@ Result<Appearance> ReadAppearanceTables(SQLite::Database& database, const std::s
     return MakeError(ErrorCode::kUnsupported, "{}: appearance version {}, this program reads {}", path,
                      version, kAppearanceVersion);
   }
-  SQLite::Statement header(database,
-                           "SELECT num_nodes, num_links, num_components, num_dominators, strong_num_inliers, "
-                           "max_detour_links FROM appearance");
+  LimitedStatement header(database,
+                          "SELECT num_nodes, num_links, num_components, num_dominators, strong_num_inliers, "
+                          "max_detour_links FROM appearance");
   if (!header.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table appearance is empty", path);
   const int64_t num_nodes = header.getColumn(0).getInt64(), num_links = header.getColumn(1).getInt64(),
                 num_components = header.getColumn(2).getInt64();
@@ -153,7 +153,7 @@ Result<Appearance> ReadAppearanceTables(SQLite::Database& database, const std::s
   appearance.num_dominators = header.getColumn(3).getInt();
   appearance.strong_num_inliers = header.getColumn(4).getInt();
   appearance.max_detour_links = header.getColumn(5).getInt();
-  SQLite::Statement bounds(database, "SELECT component_idx, lower_bound FROM components ORDER BY 1");
+  LimitedStatement bounds(database, "SELECT component_idx, lower_bound FROM components ORDER BY 1");
   while (bounds.executeStep()) {
     if (bounds.getColumn(0).getInt64() != appearance.NumComponents()) {
       return MakeError(ErrorCode::kCorrupt, "{}: table components, component {}: missing", path,

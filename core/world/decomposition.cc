@@ -27,9 +27,9 @@ Result<Decomposition> ReadRegionsTables(SQLite::Database& database, const std::s
                      kRegionsVersion);
   }
   Decomposition decomposition;
-  SQLite::Statement header(database,
-                           "SELECT algorithm, k, tau, rho, seed, lower_bound, uncovered_limit, uncovered "
-                           "FROM decomposition");
+  LimitedStatement header(database,
+                          "SELECT algorithm, k, tau, rho, seed, lower_bound, uncovered_limit, uncovered "
+                          "FROM decomposition");
   if (!header.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table decomposition is empty", path);
   decomposition.algorithm = header.getColumn(0).getString();
   decomposition.k = header.getColumn(1).getInt();
@@ -41,8 +41,8 @@ Result<Decomposition> ReadRegionsTables(SQLite::Database& database, const std::s
   CAIRN_ASSIGN_OR_RETURN(decomposition.uncovered,
                          BlobToVector<StationIdx>(header.getColumn(7), path + ": uncovered stations"));
 
-  SQLite::Statement regions(database,
-                            "SELECT region_idx, features, stations FROM regions ORDER BY region_idx");
+  LimitedStatement regions(database,
+                           "SELECT region_idx, features, stations FROM regions ORDER BY region_idx");
   for (int64_t idx = 0; regions.executeStep(); ++idx) {
     const std::string what = fmt::format("{}: region {}", path, idx);
     if (regions.getColumn(0).getInt64() != idx) return MakeError(ErrorCode::kCorrupt, "{}: missing", what);

@@ -49,7 +49,7 @@ Result<std::vector<DroppedItem>> ReadDroppedItems(const std::string& path, const
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<DroppedItem>> {
     std::vector<DroppedItem> items;
     if (!HasTable(database, table)) return items;
-    SQLite::Statement row(
+    LimitedStatement row(
         database, fmt::format("SELECT reason_id, item_id, found, seen_at FROM {} ORDER BY rowid", table));
     while (row.executeStep()) {
       const std::string what = fmt::format("{}: table {}, row {}", path, table, items.size() + 1);

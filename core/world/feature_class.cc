@@ -79,10 +79,10 @@ Result<std::vector<FeatureClass>> SelectClasses(SQLite::Database& database, cons
                                                 const std::string& path, const std::set<ImageId>& image_ids,
                                                 size_t num_sessions, int num_values) {
   std::vector<FeatureClass> classes;
-  SQLite::Statement row(database,
-                        "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
-                        "observations, presence, sightings FROM " +
-                            table + " ORDER BY 1");
+  LimitedStatement row(database,
+                       "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
+                       "observations, presence, sightings FROM " +
+                           table + " ORDER BY 1");
   while (row.executeStep()) {
     CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class,
                            ClassFromRow(row, path, image_ids, num_sessions, num_values));
@@ -134,9 +134,9 @@ void InsertChanges(SQLite::Database& database, const std::vector<PlaceChange>& c
 Result<std::vector<PlaceChange>> SelectChanges(SQLite::Database& database, const std::string& path,
                                                const std::set<ImageId>& image_ids, size_t num_sessions) {
   std::vector<PlaceChange> changes;
-  SQLite::Statement row(database,
-                        "SELECT session_idx, position, radius_m, num_vanished, num_appeared, image_before, "
-                        "image_after, moved_to, num_moved FROM changes ORDER BY rowid");
+  LimitedStatement row(database,
+                       "SELECT session_idx, position, radius_m, num_vanished, num_appeared, image_before, "
+                       "image_after, moved_to, num_moved FROM changes ORDER BY rowid");
   while (row.executeStep()) {
     PlaceChange change;
     change.session = row.getColumn(0).getInt();
@@ -186,8 +186,8 @@ void InsertCameras(SQLite::Database& database, const std::string& table, const s
 Result<std::vector<Camera>> SelectCameras(SQLite::Database& database, const std::string& table,
                                           const std::string& path) {
   std::vector<Camera> cameras;
-  SQLite::Statement row(database, "SELECT camera_id, model, width, height, params, has_focal_prior FROM " +
-                                      table + " ORDER BY 1");
+  LimitedStatement row(database, "SELECT camera_id, model, width, height, params, has_focal_prior FROM " +
+                                     table + " ORDER BY 1");
   while (row.executeStep()) {
     Camera camera;
     camera.camera_id = row.getColumn(0).getUInt();
@@ -270,9 +270,11 @@ Result<Classes> ReadClasses(const std::string& path) {
     const int num_values = classes.descriptor_kind.num_values;
     CAIRN_ASSIGN_OR_RETURN(classes.cameras, SelectCameras(database, "cameras", path));
     CAIRN_ASSIGN_OR_RETURN(classes.stated_cameras, SelectCameras(database, "stated_cameras", path));
+    std::set<CameraId> camera_ids;
+    for (const Camera& camera : classes.cameras) camera_ids.insert(camera.camera_id);
     std::set<ImageId> image_ids;
-    SQLite::Statement image_row(database,
-                                "SELECT image_id, name, camera_id, refined, given FROM images ORDER BY 1");
+    LimitedStatement image_row(database,
+                               "SELECT image_id, name, camera_id, refined, given FROM images ORDER BY 1");
     while (image_row.executeStep()) {
       SurveyImage image;
       image.image_id = image_row.getColumn(0).getUInt();
@@ -284,10 +286,15 @@ Result<Classes> ReadClasses(const std::string& path) {
                              ArrayFromColumn<7>(image_row.getColumn(4), path + ": " + image.name));
       image.cam_from_world = PoseFromArray(refined);
       image.given_cam_from_world = PoseFromArray(given);
-      image_ids.insert(image.image_id);
+      if (!image_ids.insert(image.image_id).second)
+        return MakeError(ErrorCode::kCorrupt, "{}: two images have the number {}", path, image.image_id);
+      if (!camera_ids.contains(image.camera_id)) {
+        return MakeError(ErrorCode::kCorrupt, "{}: image '{}' has camera {}, which is not in it", path,
+                         image.name, image.camera_id);
+      }
       classes.images.push_back(image);
     }
-    SQLite::Statement session_row(database, "SELECT name FROM sessions ORDER BY session_idx");
+    LimitedStatement session_row(database, "SELECT name FROM sessions ORDER BY session_idx");
     while (session_row.executeStep()) classes.sessions.push_back(session_row.getColumn(0).getString());
     CAIRN_ASSIGN_OR_RETURN(classes.classes, SelectClasses(database, "classes", path, image_ids,
                                                           classes.sessions.size(), num_values));
@@ -295,7 +302,7 @@ Result<Classes> ReadClasses(const std::string& path) {
                                                            classes.sessions.size(), num_values));
     CAIRN_ASSIGN_OR_RETURN(classes.changes,
                            SelectChanges(database, path, image_ids, classes.sessions.size()));
-    SQLite::Statement alignment_row(
+    LimitedStatement alignment_row(
         database,
         "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg, keypoint_correlation "
         "FROM alignment");
@@ -307,7 +314,7 @@ Result<Classes> ReadClasses(const std::string& path) {
       classes.stated_pose_sigma_deg = alignment_row.getColumn(2).getDouble();
       classes.keypoint_correlation = alignment_row.getColumn(3).getDouble();
     }
-    SQLite::Statement dropped_row(database, "SELECT reason, num_classes FROM dropped ORDER BY 1");
+    LimitedStatement dropped_row(database, "SELECT reason, num_classes FROM dropped ORDER BY 1");
     while (dropped_row.executeStep())
       classes.dropped[dropped_row.getColumn(0).getString()] = dropped_row.getColumn(1).getInt64();
     return classes;

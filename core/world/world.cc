@@ -87,7 +87,7 @@ Result<World> ReadWorldTables(SQLite::Database& database, const std::string& pat
                      kWorldVersion);
   }
   World world;
-  SQLite::Statement header(
+  LimitedStatement header(
       database,
       "SELECT num_stations, num_edges, num_features, lattice_spacing_m, qw, qx, qy, qz, tx, ty, tz "
       "FROM world");
@@ -99,9 +99,9 @@ Result<World> ReadWorldTables(SQLite::Database& database, const std::string& pat
   world.floor_from_world.rotation = Eigen::Quaterniond(number(4), number(5), number(6), number(7));
   world.floor_from_world.translation = Eigen::Vector3d(number(8), number(9), number(10));
 
-  SQLite::Statement stations(database,
-                             "SELECT station_idx, x, y, heading_deg, neighbours, images FROM stations "
-                             "ORDER BY station_idx");
+  LimitedStatement stations(database,
+                            "SELECT station_idx, x, y, heading_deg, neighbours, images FROM stations "
+                            "ORDER BY station_idx");
   for (int64_t station = 0; stations.executeStep(); ++station) {
     const std::string what = fmt::format("{}: table stations, station {}", path, station);
     if (stations.getColumn(0).getInt64() != station)
@@ -115,8 +115,8 @@ Result<World> ReadWorldTables(SQLite::Database& database, const std::string& pat
     CAIRN_ASSIGN_OR_RETURN(std::vector<ImageId> images, BlobToVector<ImageId>(stations.getColumn(5), what));
     world.station_images.push_back(std::move(images));
   }
-  SQLite::Statement features(database,
-                             "SELECT feature_idx, class_id, stations FROM features ORDER BY feature_idx");
+  LimitedStatement features(database,
+                            "SELECT feature_idx, class_id, stations FROM features ORDER BY feature_idx");
   for (int64_t feature = 0; features.executeStep(); ++feature) {
     const std::string what = fmt::format("{}: table features, feature {}", path, feature);
     if (features.getColumn(0).getInt64() != feature)

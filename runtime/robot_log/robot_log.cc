@@ -29,6 +29,8 @@ constexpr double kRecentS = 86400;
 constexpr double kRadiusM = 0.5, kRadiusDeg = 30, kMaxRadiusRatio = 8;
 // What a frame takes on the disk besides its features: rows, half-filled pages, lines of lists.
 constexpr double kBytesBesides = 16384;
+// Of reading a small log.
+constexpr int64_t kMaxLoadSteps = 10'000'000;
 // Of the write-ahead log, in pages of 4 KiB, before it is taken into the database.
 constexpr int kMaxLogPages = 128;
 
@@ -171,13 +173,17 @@ Status RobotLog::Writer::Load(const MapHead& map, const MachineClocks& now) {
   const std::string path = folder_ + "/" + kFeaturesFile;
   database_ = std::make_unique<SQLite::Database>(path, SQLite::OPEN_READWRITE);
   SQLite::Database& database = *database_;
+  Harden(database, UINT64_MAX);  // frames of any size are added
+  ReadSchema(database);
+  std::error_code error;
+  const StepLimit steps(database, kMaxLoadSteps + 16 * static_cast<int64_t>(fs::file_size(path, error)));
   if (!HasTable(database, "cairn_log_frames")) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: no log of a robot, which are not added to other captures; name a new folder", path);
   }
   database.exec("PRAGMA journal_mode = WAL");
   database.exec(fmt::format("PRAGMA wal_autocheckpoint = {}", kMaxLogPages));
-  SQLite::Statement of_map(database, "SELECT name, frame FROM cairn_log_map");
+  LimitedStatement of_map(database, "SELECT name, frame FROM cairn_log_map");
   if (!of_map.executeStep() || of_map.getColumn(0).getString() != map.name ||
       of_map.getColumn(1).getString() != CaptureFrameJson(map.frame)) {
     return MakeError(
@@ -186,17 +192,17 @@ Status RobotLog::Writer::Load(const MapHead& map, const MachineClocks& now) {
         "of one frame; name another folder",
         folder_, map.name);
   }
-  SQLite::Statement state(database,
-                          "SELECT bytes, lived_s, latest_wall_s, boot_s, boot_id FROM cairn_log_budget");
+  LimitedStatement state(database,
+                         "SELECT bytes, lived_s, latest_wall_s, boot_s, boot_id FROM cairn_log_budget");
   if (!state.executeStep())
     return MakeError(ErrorCode::kCorrupt, "{}: table cairn_log_budget is empty", path);
   budget_ = {state.getColumn(0).getDouble(), state.getColumn(1).getDouble(), state.getColumn(2).getDouble(),
              state.getColumn(3).getDouble(), state.getColumn(4).getString()};
   budget_.Advance(MaxBytesPerDay(), now);
   CAIRN_ASSIGN_OR_RETURN(cameras_, ReadDatabaseCameras(database));
-  SQLite::Statement frames(database,
-                           "SELECT image_id, name, camera_id, lived_s, qw, qx, qy, qz, tx, ty, tz FROM "
-                           "cairn_log_frames JOIN images USING (image_id) ORDER BY image_id");
+  LimitedStatement frames(database,
+                          "SELECT image_id, name, camera_id, lived_s, qw, qx, qy, qz, tx, ty, tz FROM "
+                          "cairn_log_frames JOIN images USING (image_id) ORDER BY image_id");
   images_text_.clear();
   while (frames.executeStep()) {
     const auto number = [&](int column) { return frames.getColumn(column).getDouble(); };

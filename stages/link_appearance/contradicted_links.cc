@@ -15,13 +15,16 @@ constexpr int kMinNumTested = 5;
 constexpr double kMaxErrorRatio = 0.02;
 constexpr size_t kMaxNumKept = 4096;  // images whose keypoints are kept, some dozen kB each
 
+constexpr char kSelectMatches[] = "SELECT data FROM two_view_geometries WHERE pair_id = ?";
+
 class LinkTester {
  public:
   LinkTester(const Classes& classes, SQLite::Database& database, const std::string& matches_path)
       : classes_(classes),
         database_(database),
         matches_path_(matches_path),
-        query_(database, "SELECT data FROM two_view_geometries WHERE pair_id = ?") {
+        query_(database, kSelectMatches) {
+    CheckKeys(database, kSelectMatches);
     for (const Camera& camera : classes.cameras) cameras_[camera.camera_id] = &camera;
     for (const SurveyImage& image : classes.images) images_[image.image_id].image = &image;
     for (size_t i = 0; i < classes.classes.size(); ++i) {

@@ -59,8 +59,8 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
   return WithDatabaseErrors(matches_path, [&]() -> Result<ImageLinks> {
     ImageLinks result;
     CAIRN_ASSIGN_OR_RETURN(result.images, ReadDatabaseImages(database));
-    SQLite::Statement pairs(database,
-                            "SELECT pair_id, rows, config FROM two_view_geometries ORDER BY pair_id");
+    LimitedStatement pairs(database,
+                           "SELECT pair_id, rows, config FROM two_view_geometries ORDER BY pair_id");
     while (pairs.executeStep()) {
       const auto [image_id1, image_id2] = ImageIdsFromPairId(pairs.getColumn(0).getInt64());
       const int64_t num_inliers = pairs.getColumn(1).getInt64();

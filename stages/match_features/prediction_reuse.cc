@@ -65,7 +65,7 @@ ContentHash PredictionReuse::KeyOf(int generation) const {
 }
 
 std::optional<std::vector<PredictedPair>> PredictionReuse::Find(int generation, ReuseSources* sources) const {
-  return sources->Find(KeyOf(generation), [](const ReuseEntry& entry, ReuseSources::Source& source) {
+  return sources->Find(KeyOf(generation), [&](const ReuseEntry& entry, ReuseSources::Source& source) {
     std::optional<std::vector<PredictedPair>> predicted;
     SQLite::Statement query(source.Database(), "SELECT pairs FROM cairn_predicted_pairs WHERE idx = ?");
     query.bind(1, entry.row);
@@ -75,9 +75,14 @@ std::optional<std::vector<PredictedPair>> PredictionReuse::Find(int generation, 
         HashContents({reinterpret_cast<const char*>(numbers->data()), numbers->size() * sizeof(int32_t)}) !=
             entry.contents)
       return predicted;
-    predicted.emplace();
-    for (size_t i = 0; i < numbers->size(); i += kNumbersOfPair)
-      predicted->push_back({{(*numbers)[i], (*numbers)[i + 1]}, (*numbers)[i + 2]});
+    std::vector<PredictedPair> pairs;
+    for (size_t i = 0; i < numbers->size(); i += kNumbersOfPair) {
+      const int first = (*numbers)[i], second = (*numbers)[i + 1];
+      // The hash is in a file beside it that somebody may have written as well.
+      if (first < 0 || second < 0 || std::max(first, second) >= std::ssize(generations_)) return predicted;
+      pairs.push_back({{first, second}, (*numbers)[i + 2]});
+    }
+    predicted = std::move(pairs);
     return predicted;
   });
 }

@@ -77,7 +77,7 @@ Result<std::optional<IndexPairs>> ReadPlannedPairs(const std::string& plan_path,
                                                    const MatchImages& images) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(plan_path));
   return WithDatabaseErrors(plan_path, [&]() -> Result<std::optional<IndexPairs>> {
-    SQLite::Statement plan(database, "SELECT num_shards, image_step FROM cairn_shard_plan");
+    LimitedStatement plan(database, "SELECT num_shards, image_step FROM cairn_shard_plan");
     if (!plan.executeStep()) return OtherPlan(plan_path, "not a whole plan");
     const int num_shards = plan.getColumn(0).getInt();
     if (num_shards != shard.count) {
@@ -86,7 +86,7 @@ Result<std::optional<IndexPairs>> ReadPlannedPairs(const std::string& plan_path,
     }
     if (!plan.getColumn(1).isNull()) return std::optional<IndexPairs>();
     IndexPairs pairs;
-    SQLite::Statement query(database, "SELECT image_ids FROM cairn_planned_pairs WHERE shard = ?");
+    LimitedStatement query(database, "SELECT image_ids FROM cairn_planned_pairs WHERE shard = ?");
     query.bind(1, shard.index);
     if (!query.executeStep()) return std::optional(std::move(pairs));  // it has no work
     CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageId> image_ids,

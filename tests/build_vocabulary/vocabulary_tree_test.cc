@@ -189,10 +189,12 @@ void ExpectCorrupt(const std::string& sql, const std::string& message) {
   EXPECT_THAT(read.error().message, testing::HasSubstr(message));
 }
 
-// A table of the same rows, and of `more`, that keeps none of the schema's promises.
-std::string WithoutKey(const std::string& table, const std::string& more) {
-  return "CREATE TABLE plain AS SELECT * FROM " + table + "; DROP TABLE " + table +
-         "; ALTER TABLE plain RENAME TO " + table + "; INSERT INTO " + table + " " + more;
+// A table of the same rows, and of `more`, whose key lets a node or a word have several.
+std::string WithManyRows(const std::string& table, const std::string& columns, const std::string& more) {
+  return fmt::format(
+      "CREATE TABLE plain ({1}, PRIMARY KEY ({1})) WITHOUT ROWID; INSERT INTO plain SELECT * FROM {0}; DROP "
+      "TABLE {0}; ALTER TABLE plain RENAME TO {0}; INSERT INTO {0} {2}",
+      table, columns, more);
 }
 
 TEST(VocabularyTree, DamagedNodesAreRefused) {
@@ -214,7 +216,7 @@ TEST(VocabularyTree, DamagedNodesAreRefused) {
   ExpectCorrupt(nodes("centres = zeroblob(257) WHERE node_id = 1"), "2 children with 257 bytes");
   // The second row of a node would have other children in the place of the first one's.
   ExpectCorrupt(
-      WithoutKey("vocabulary_nodes", "VALUES (0, 1, zeroblob(128))") +
+      WithManyRows("vocabulary_nodes", "node_id, num_children, centres", "VALUES (0, 1, zeroblob(128))") +
           "; UPDATE vocabulary_nodes SET num_children = 1, centres = zeroblob(128) WHERE node_id = 1",
       "vocabulary_nodes 0: ");
 }
@@ -236,7 +238,8 @@ TEST(VocabularyTree, DamagedWordsAreRefused) {
   ExpectCorrupt(word_1("num_postings = 1000000000"), refused);
   ExpectCorrupt(word_1("word_id = -1"), "vocabulary_words -1: ");
   ExpectCorrupt(word_1("word_id = 3"), "vocabulary_words 3: ");
-  ExpectCorrupt(WithoutKey("vocabulary_words", "VALUES (1, 1, x'0101')"), "vocabulary_words 1: ");
+  ExpectCorrupt(WithManyRows("vocabulary_words", "word_id, num_postings, postings", "VALUES (1, 1, x'0101')"),
+                "vocabulary_words 1: ");
 
   const Result<Vocabulary> most = ReadAfter(word_1("num_postings = 2, postings = x'010101ffffffff07'"));
   ASSERT_TRUE(most.ok()) << most.error().message;

@@ -22,11 +22,17 @@ using testing::Pair;
 // seen everywhere, the second at one place.
 Classes SquareSurvey(int side) {
   Classes classes;
+  classes.cameras = {{.camera_id = 1,
+                      .model = CameraModel::kSimplePinhole,
+                      .width = 640,
+                      .height = 480,
+                      .params = {500, 320, 240}}};
   classes.classes.resize(2);
   for (int i = 0; i < side * side; ++i) {
     SurveyImage& image = classes.images.emplace_back();
     image.image_id = static_cast<ImageId>(i + 1);
     image.name = fmt::format("{}.png", image.image_id);
+    image.camera_id = 1;
     image.cam_from_world.rotation =
         Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
     image.cam_from_world.translation =

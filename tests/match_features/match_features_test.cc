@@ -404,8 +404,9 @@ TEST_F(MatchFeaturesTest, ASecondRowOfAnImageIsAnError) {
   WriteFeatures(3, [](SQLite::Database& database) {
     for (const char* table : {"keypoints", "descriptors"}) {
       database.exec(fmt::format(
-          "CREATE TABLE plain AS SELECT * FROM {0}; DROP TABLE {0}; ALTER TABLE plain RENAME TO {0}; INSERT "
-          "INTO {0} "
+          "CREATE TABLE plain (image_id, rows, cols, data, PRIMARY KEY (image_id, rows)) WITHOUT ROWID; "
+          "INSERT "
+          "INTO plain SELECT * FROM {0}; DROP TABLE {0}; ALTER TABLE plain RENAME TO {0}; INSERT INTO {0} "
           "SELECT image_id, 1, cols, substr(data, 1, length(data) / rows) FROM {0} WHERE rows > 1",
           table));
     }

@@ -6,6 +6,7 @@
 
 #include "core/files/file.h"
 #include "core/line/program_identity.h"
+#include "stages/match_features/prediction_reuse.h"
 #include "tests/match_features/features_fixture.h"
 
 namespace cairn::match_features {
@@ -325,6 +326,38 @@ TEST_F(MatchFeaturesReuse, NamedFilesMustBeDatabases) {
   std::ofstream(folder_ + "/text.db") << "no database";
   EXPECT_EQ(MatchTo("x.db", false, {.files = {folder_ + "/text.db"}}).error().code, ErrorCode::kCorrupt);
   EXPECT_FALSE(fs::exists(folder_ + "/x.db"));
+}
+
+// Who writes the results writes their hashes.
+TEST(PredictionReuse, PairsOfImagesThatAreNotThereAreComputed) {
+  const std::string path = testing::TempDir() + "/predicted_pairs.db";
+  PredictionReuse reuse({HashContents("a"), HashContents("b"), HashContents("c")}, {0, 0, 0}, {});
+  const auto found = [&](const std::vector<int32_t>& numbers) {
+    const std::string bytes(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(int32_t));
+    ReuseEntry entry;
+    EXPECT_TRUE(WriteDatabase(path, "", [&](SQLite::Database& database) {
+                  CreatePredictionTable(database);
+                  entry = reuse.Write(0, {}, database);
+                  SQLite::Statement update(database, "UPDATE cairn_predicted_pairs SET pairs = ?");
+                  update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+                  update.exec();
+                  return Ok();
+                }).ok());
+    entry.contents = HashContents(bytes);
+    EXPECT_TRUE(WriteReuseFile(path, {entry}).ok());
+    ReuseSources sources;
+    EXPECT_TRUE(sources.Add(path).ok());
+    return reuse.Find(0, &sources);
+  };
+  const auto pairs = found({0, 1, 50, 2, 0, 7});
+  ASSERT_TRUE(pairs.has_value());
+  ASSERT_EQ(pairs->size(), 2u);
+  EXPECT_EQ(pairs->at(0).idxs, std::pair(0, 1));
+  EXPECT_EQ(pairs->at(0).num_expected, 50);
+  EXPECT_EQ(pairs->at(1).idxs, std::pair(2, 0));
+  for (const auto& [first, second] : {std::pair(0, 3), std::pair(3, 0), std::pair(-1, 0), std::pair(0, -1)})
+    EXPECT_FALSE(found({0, 1, 50, first, second, 50}).has_value()) << first << " " << second;
+  EXPECT_FALSE(found({0, 1}).has_value());
 }
 
 }  // namespace

@@ -27,6 +27,11 @@ Result<Features> ReadFeatures(SQLite::Database& database, ImageId image_id, cons
   Features features{.keypoints = {}, .descriptors = {}, .kind = kind};
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image_id));
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image_id, kind));
+  if (std::ssize(features.keypoints) != features.descriptors.rows()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints and {} descriptors",
+                     DatabasePath(database), image_id, features.keypoints.size(),
+                     features.descriptors.rows());
+  }
   return features;
 }
 
@@ -98,7 +103,10 @@ void LeaveOutFeatures(const std::set<ClassId>& class_ids, World* world, Decompos
   world->class_ids = std::move(left_ids);
   world->areas = std::move(left_areas);
   for (Region& region : decomposition->regions) {
-    for (FeatureIdx& feature : region.features) feature = number_of[feature];
+    for (FeatureIdx& feature : region.features) {
+      // Those that the world lacks are refused with the map.
+      if (feature >= 0 && feature < std::ssize(number_of)) feature = number_of[feature];
+    }
     std::erase(region.features, kGone);
   }
 }

@@ -14,7 +14,7 @@ namespace {
 // Number of rows that a table of features states for each image.
 Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, const std::string& table) {
   std::map<ImageId, int64_t> counts;
-  SQLite::Statement query(database, "SELECT image_id, rows FROM " + table);
+  LimitedStatement query(database, "SELECT image_id, rows FROM " + table);
   while (query.executeStep()) {
     const int64_t rows = query.getColumn(1).getInt64();
     if (rows < 0 || rows > std::numeric_limits<int>::max()) {

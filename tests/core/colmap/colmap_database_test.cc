@@ -177,8 +177,18 @@ TEST_F(ColmapDatabase, DamagedRowsAreNamed) {
   EXPECT_THAT(
       MessageWith(
           "CREATE TABLE plain AS SELECT * FROM images; DROP TABLE images; ALTER TABLE plain RENAME TO "
-          "images; UPDATE images SET image_id = 1"),  // a table without its key
-      HasSubstr("table images, row 1: another image has the same number"));
+          "images; UPDATE images SET image_id = 1"),
+      HasSubstr("a table lacks the key by which it is read"));
+  // A key by which they can be read, but that lets an image have two rows.
+  const std::string two_rows =
+      "CREATE TABLE plain (image_id, name, camera_id, PRIMARY KEY (image_id, name)) WITHOUT ROWID; INSERT "
+      "INTO "
+      "plain SELECT image_id, name, camera_id FROM images; DROP TABLE images; ALTER TABLE plain RENAME TO "
+      "images; UPDATE images SET image_id = 1";
+  EXPECT_THAT(MessageWith(two_rows), HasSubstr("table images, row 1: another image has the same number"));
+  SQLite::Database opened = OpenColmapDatabase(path_).value();
+  EXPECT_THAT(ReadDatabaseTwoViewGeometries(opened, 1).error().message,
+              HasSubstr("table keypoints, row 1: the image has two rows"));
   EXPECT_THAT(update("images", "name = 'a' || char(10) || 'b.png'", "image_id = 2"),
               HasSubstr("has a control character"));
   EXPECT_THAT(update("images", "image_id = -3", "image_id = 2"),

@@ -37,7 +37,7 @@ StoredValue I(int64_t value) { return value; }
 StoredRows RowsOf(const std::string& table, const std::vector<Values>& rows) {
   StoredRows stored;
   for (const Values& values : rows)
-    stored[table].emplace_back("map.cairn: table " + table + ", row 1", values);
+    stored[table].emplace_back(std::make_shared<const std::string>("map.cairn: table " + table), 1, values);
   return stored;
 }
 
@@ -56,7 +56,8 @@ std::string Decoding(const std::string& table, Values values, size_t column, con
 constexpr int64_t kMost = 2147483647;
 
 TEST(StoredRow, ValuesOfAnotherTypeAreNamed) {
-  const StoredRow row("map.cairn: table meta, row 2", {I(5), 2.5, T("a"), StoredBlob{"b"}, std::monostate()});
+  const StoredRow row(std::make_shared<const std::string>("map.cairn: table meta"), 2,
+                      {I(5), 2.5, T("a"), StoredBlob{"b"}, std::monostate()});
   EXPECT_EQ(*row.Integer(0), 5);
   EXPECT_EQ(*row.Real(1), 2.5);
   EXPECT_EQ(*row.Text(2), "a");
@@ -96,6 +97,21 @@ TEST(StoredRow, TablesAreReadUpToTheirLimits) {
   EXPECT_THAT(MessageOf(read(4, 2, 7)), HasSubstr("table t has 3 columns, expected 4"));
   EXPECT_THAT(MessageOf(read(3, 1, 7)), HasSubstr("table t has more than 1 rows"));
   EXPECT_THAT(MessageOf(read(3, 2, 6)), HasSubstr("table t shows more than the 6 bytes that the file has"));
+}
+
+// NULLs take a byte each.
+TEST(StoredRow, ValuesAreNoMoreThanAFileHolds) {
+  SQLite::Database database(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  database.exec(
+      "CREATE TABLE t (a INTEGER PRIMARY KEY, b, c); WITH RECURSIVE r (i) AS (SELECT 1 UNION ALL SELECT i + "
+      "1 "
+      "FROM r WHERE i < 30000) INSERT INTO t SELECT i, NULL, NULL FROM r");
+  const auto read = [&](int64_t num_bytes) {
+    return MessageOf(ReadStoredRows(database, "map.cairn", {{"t", 3, 30'000}}, num_bytes));
+  };
+  // Three values and as much for each row: 180,000, of which 100,000 are any file's.
+  EXPECT_EQ(read(240'000), "");
+  EXPECT_THAT(read(239'996), HasSubstr("table t shows more than the 239996 bytes that the file has"));
 }
 
 // As schemas/FORMAT.md says: the name; per row its number of columns, per column its type and what it has; a
@@ -310,7 +326,7 @@ TEST(FindingsRows, PromisesAreStoredAsThePageSays) {
 StoredRows HeadRows() {
   StoredRows rows;
   const auto put = [&](const std::string& table, const Values& values) {
-    rows[table].emplace_back("map.cairn: table " + table, values);
+    rows[table].emplace_back(std::make_shared<const std::string>("map.cairn: table " + table), 1, values);
   };
   for (const auto& [key, value] :
        std::map<std::string, std::string>{{"name", "kitchen"},
@@ -392,7 +408,8 @@ TEST(HeadRows, AreReadByTheirColumns) {
 TEST(HeadRows, ThatMakeNoSenseAreRefused) {
   const auto meta = [](const std::string& key, const std::string& value) {
     return MessageOf(DecodeHead([&](StoredRows* rows) {
-      rows->at("meta").emplace_back("row", Values{T(key), T(value)});
+      rows->at("meta").emplace_back(std::make_shared<const std::string>("table meta"), 9,
+                                    Values{T(key), T(value)});
     }));
   };
   for (const char* key : {"seed", "k", "tau", "rho"})
@@ -421,7 +438,7 @@ TEST(HeadRows, ThatMakeNoSenseAreRefused) {
     return MessageOf(DecodeHead([&](StoredRows* rows) {
       Values values = rows->at("cameras")[0].values();
       values[column] = value;
-      rows->at("cameras")[0] = StoredRow("row", values);
+      rows->at("cameras")[0] = StoredRow(std::make_shared<const std::string>("t"), 1, values);
     }));
   };
   EXPECT_EQ(camera(0, I(0)), "");

@@ -30,7 +30,7 @@ class SqliteBag : public Bag {
                            path_, column, table);
         }
       }
-      SQLite::Statement query(database_, "SELECT id, name, type, serialization_format FROM topics");
+      LimitedStatement query(database_, "SELECT id, name, type, serialization_format FROM topics");
       while (query.executeStep()) {
         const bool is_cdr = query.getColumn(3).getString() == "cdr";
         topics_[query.getColumn(0).getInt64()] = {query.getColumn(1).getString(),
@@ -54,7 +54,7 @@ class SqliteBag : public Bag {
     int64_t num_shown = 0;
     const Status status = WithDatabaseErrors(path_, [&]() -> Status {
       // In the order of rows, which is that of the file: sorting would hold all images.
-      SQLite::Statement query(database_, "SELECT topic_id, timestamp, data FROM messages ORDER BY rowid");
+      LimitedStatement query(database_, "SELECT topic_id, timestamp, data FROM messages ORDER BY rowid");
       while (query.executeStep()) {
         const auto topic = topics_.find(query.getColumn(0).getInt64());
         if (topic == topics_.end()) {
