@@ -1,5 +1,6 @@
 // Maps of format 1.x, read and checked: the tables of schemas/0001_map.sql, and those of vocabulary.sql
 // beside them.
+#include <algorithm>
 #include <filesystem>
 
 #include "core/base/blob.h"
@@ -89,10 +90,13 @@ Status ReadRegions(SQLite::Database& database, const std::string& path, MapRows*
   return Ok();
 }
 
-Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRows* rows) {
+Status ReadLandmarks(SQLite::Database& database, const std::string& path, int64_t num_bytes, MapRows* rows) {
   const int64_t num_landmarks =
       database.execAndGet("SELECT count(*) FROM landmarks WHERE landmark_idx >= 0").getInt64();
-  if (num_landmarks > INT32_MAX) return Corrupt(path, "{} landmarks", num_landmarks);
+  if (num_landmarks > std::min<int64_t>(INT32_MAX, num_bytes / kSiftDescriptorDim)) {
+    return Corrupt(path, "{} landmarks, more than a map of {} bytes has descriptors for", num_landmarks,
+                   num_bytes);
+  }
   rows->landmarks.reserve(num_landmarks);
   rows->descriptors.resize(num_landmarks, kSiftDescriptorDim);
   LimitedStatement query(
@@ -146,7 +150,7 @@ Result<MapRows> ReadTables(SQLite::Database& database, const std::string& path) 
   MapRows rows;
   CAIRN_ASSIGN_OR_RETURN(const StoredRows head, ReadStoredRows(database, path, HeadTables(), num_bytes));
   CAIRN_RETURN_IF_ERROR(DecodeMapHead(head, path, &rows));
-  CAIRN_RETURN_IF_ERROR(ReadLandmarks(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadLandmarks(database, path, num_bytes, &rows));
   CAIRN_RETURN_IF_ERROR(ReadStations(database, path, &rows));
   CAIRN_RETURN_IF_ERROR(ReadRegions(database, path, &rows));
   CAIRN_RETURN_IF_ERROR(ReadImages(database, path, &rows));

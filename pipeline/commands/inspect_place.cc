@@ -68,12 +68,12 @@ Result<std::string> WhyRejected(const PlaceQuestion& question) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::string> {
     if (HasTable(database, "cairn_rejects")) {
-      LimitedStatement query(database, "SELECT reason FROM cairn_rejects WHERE name = ?");
+      SQLite::Statement query(database, "SELECT reason FROM cairn_rejects WHERE name = ?");
       query.bind(1, *question.image);
       if (query.executeStep())
         return fmt::format("extract_features rejected it: {}", query.getColumn(0).getString());
     }
-    LimitedStatement query(database, "SELECT count(*) FROM images WHERE name = ?");
+    SQLite::Statement query(database, "SELECT count(*) FROM images WHERE name = ?");
     query.bind(1, *question.image);
     query.executeStep();
     if (query.getColumn(0).getInt() > 0)

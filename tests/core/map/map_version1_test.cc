@@ -158,6 +158,12 @@ TEST(MapVersion1, LandmarksThatMakeNoSenseAreRefused) {
   for (const int num_bytes : {127, 129})
     EXPECT_THAT(refusal(fmt::format("descriptor = zeroblob({})", num_bytes)),
                 HasSubstr(fmt::format("a covariance of 24 and a descriptor of {} bytes", num_bytes)));
+  // Rows of few bytes, for which descriptors of 128 would be allocated.
+  EXPECT_THAT(
+      RefusalOf("WITH RECURSIVE c (i) AS (SELECT 3 UNION ALL SELECT i + 1 FROM c WHERE i < 50000) INSERT "
+                "INTO landmarks (landmark_idx, class_id, x, y, z, scale, num_observations, covariance, "
+                "descriptor) SELECT i, i, 0, 0, 0, 0, 2, x'', x'' FROM c"),
+      HasSubstr("50001 landmarks, more than a map of"));
   // A number that another one would be read for.
   EXPECT_EQ(refusal("class_id = 0, num_observations = 0"), "");
   for (const char* class_id : {"-1", "4294967296"})
