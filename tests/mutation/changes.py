@@ -30,6 +30,8 @@ class Change:
 def changes_of(file, text):
     """All changes of a source, in the order of its lines."""
     found, in_comment = [], False
+    # Raw strings, of several lines, first.
+    text = re.sub(r'R"(?P<mark>[^(\s]*)\(.*?\)(?P=mark)"', lambda match: '"' + re.sub(r"[^\n]", "_", match.group()[1:-1]) + '"', text, flags=re.DOTALL)
     for number, line in enumerate(text.split("\n")):
         stripped = line.strip()
         if in_comment or stripped.startswith("/*"):

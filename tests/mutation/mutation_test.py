@@ -64,6 +64,10 @@ class Changes(unittest.TestCase):
         self.assertEqual(self.changed("/* 3\n 4\n*/ f();"), [])
         self.assertEqual(len(self.changed("/* 3 */\nx = 4;")), 1)
 
+    def test_not_in_raw_strings(self):
+        text = 'const char* const kSql = R"sql(\nCHECK (a >= 0)\n  )" < 7)sql"; x = 1;\ny = 2;'
+        self.assertEqual([(change.line, change.old) for change in changes_of("a.cc", text)], [(2, "1"), (3, "2")])
+
     def test_what_means_the_same_is_listed_by_its_line(self):
         text = "  x = a < b;"
         change = next(change for change in changes_of("room/a.cc", text) if change.new == "<=")

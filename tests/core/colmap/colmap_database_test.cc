@@ -156,10 +156,14 @@ TEST_F(ColmapDatabase, KeypointsOfTwoFourAndSixColumns) {
   };
   const std::string one = "0000803F", two = "00000040", zero = "00000000", minus_two = "000000C0";
   EXPECT_EQ(read(2, one + two).y, 2);
+  EXPECT_EQ(read(2, one + two).scale, 1);
+  EXPECT_EQ(read(2, one + two).orientation, 0);
   EXPECT_EQ(read(4, one + two + two + one).scale, 2);
   EXPECT_EQ(read(4, one + two + two + one).orientation, 1);
   // An affine shape of scale 2, turned by a quarter: a11 a12 a21 a22 = 0 -2 2 0.
   const Keypoint affine = read(6, one + two + zero + minus_two + two + zero);
+  EXPECT_EQ(affine.x, 1);
+  EXPECT_EQ(affine.y, 2);
   EXPECT_EQ(affine.scale, 2);
   EXPECT_NEAR(affine.orientation, M_PI / 2, 1e-6);
 }
@@ -214,11 +218,79 @@ TEST_F(ColmapDatabase, DamagedRowsAreNamed) {
   EXPECT_THAT(update("two_view_geometries", "config = 77", "1"), HasSubstr("config is 77"));
   EXPECT_THAT(update("two_view_geometries", "data = x'00000000020000000000000001000000'", "1"),
               HasSubstr("matches keypoints 0 and 2 of images with 2 and 2 keypoints"));
+  EXPECT_THAT(update("two_view_geometries", "data = x'02000000000000000000000001000000'", "1"),
+              HasSubstr("matches keypoints 2 and 0 of images with 2 and 2 keypoints"));
   EXPECT_THAT(update("two_view_geometries", "pair_id = pair_id + 5", "1"),
               HasSubstr("a pair of the images 1 and 7"));
   EXPECT_THAT(update("two_view_geometries", "pair_id = 2147483648", "1"),
               HasSubstr("a pair of the images 1 and 1"));
   EXPECT_THAT(update("two_view_geometries", "pair_id = -7", "1"), HasSubstr("row -7: pair_id is -7"));
+}
+
+TEST_F(ColmapDatabase, NumbersBeginWithZero) {
+  EXPECT_EQ(MessageWith(
+                "UPDATE cameras SET camera_id = 0; UPDATE images SET image_id = 0, camera_id = 0 WHERE "
+                "image_id = 1; UPDATE keypoints SET image_id = 0 WHERE image_id = 1; UPDATE descriptors SET "
+                "image_id = 0 WHERE image_id = 1; UPDATE two_view_geometries SET pair_id = 2"),
+            "");
+  SQLite::Database database = OpenColmapDatabase(path_).value();
+  EXPECT_EQ(ReadDatabaseCameras(database)->begin()->first, 0u);
+  EXPECT_EQ(ReadDatabaseImages(database)->at(0).image_id, 0u);
+  const auto geometries = ReadDatabaseTwoViewGeometries(database, 1).value();
+  EXPECT_EQ(geometries.at(0).image_id1, 0u);
+  EXPECT_EQ(geometries.at(0).image_id2, 2u);
+  EXPECT_EQ(PairIdFromImageIds(1, 2), 2147483649);  // the smaller number times 2^31 - 1, and the other one
+  EXPECT_EQ(PairIdFromImageIds(2, 1), 2147483649);
+  EXPECT_EQ(ImageIdsFromPairId(2147483649), std::pair(ImageId{1}, ImageId{2}));
+  constexpr ImageId kLast = 2147483646;
+  EXPECT_EQ(ImageIdsFromPairId(PairIdFromImageIds(3, kLast)), std::pair(ImageId{3}, kLast));
+}
+
+TEST_F(ColmapDatabase, CamerasSayWhetherTheirFocalLengthIsKnown) {
+  Make(std::string(kTables) + kRows);
+  SQLite::Database database(path_, SQLite::OPEN_READWRITE);
+  Camera camera = ReadDatabaseCameras(database)->at(1);
+  for (const bool is_known : {false, true}) {
+    camera.camera_id = is_known ? 7 : 8;
+    camera.has_focal_prior = is_known;
+    WriteDatabaseCamera(database, camera);
+    EXPECT_EQ(ReadDatabaseCameras(database)->at(camera.camera_id).has_focal_prior, is_known);
+  }
+  EXPECT_EQ(database.execAndGet("SELECT prior_focal_length FROM cameras WHERE camera_id = 7").getInt(), 1);
+}
+
+TEST_F(ColmapDatabase, WhatIsWrittenOfAPairIsRead) {
+  Make(std::string(kTables) + kRows);
+  TwoViewGeometry written{.image_id1 = 1, .image_id2 = 2, .config = TwoViewConfig::kCalibrated};
+  written.inliers = {{0, 1}, {1, 0}};
+  written.F << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  written.E = written.F.array() + 10;
+  written.H = written.F.array() + 20;
+  {
+    SQLite::Database database(path_, SQLite::OPEN_READWRITE);
+    database.exec("DELETE FROM two_view_geometries");
+    WriteDatabaseTwoViewGeometry(database, written);
+    // COLMAP reads a quaternion and a translation.
+    EXPECT_EQ(database.execAndGet("SELECT hex(qvec) FROM two_view_geometries").getString(),
+              std::string(64, '0'));
+    EXPECT_EQ(database.execAndGet("SELECT hex(tvec) FROM two_view_geometries").getString(),
+              std::string(48, '0'));
+  }
+  SQLite::Database database = OpenColmapDatabase(path_).value();
+  const TwoViewGeometry read = ReadDatabaseTwoViewGeometries(database, 1).value().at(0);
+  EXPECT_EQ(read.config, written.config);
+  EXPECT_EQ(read.inliers, written.inliers);
+  EXPECT_EQ(read.F, written.F);
+  EXPECT_EQ(read.E, written.E);
+  EXPECT_EQ(read.H, written.H);
+}
+
+TEST_F(ColmapDatabase, OneDescriptorOfAnotherLengthIsRefused) {
+  EXPECT_THAT(
+      MessageWith(
+          "DELETE FROM two_view_geometries; UPDATE keypoints SET rows = 1, data = zeroblob(8); UPDATE "
+          "descriptors SET rows = 1, cols = 64, data = zeroblob(64)"),
+      HasSubstr("table descriptors, row 1: 64 columns, expected 128"));
 }
 
 TEST_F(ColmapDatabase, LearnedDescriptorsAreRefusedWithASentence) {

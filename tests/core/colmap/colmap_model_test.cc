@@ -161,6 +161,9 @@ TEST_F(ColmapModelTest, BrokenTextNamesFileAndLine) {
   EXPECT_THAT(MessageOf("/a"), HasSubstr("images.txt:2: expected IMAGE_ID QW"));
   Write("a/images.txt", "# header\n3 2 0 0 0 1 2 3 7 a.png\n\n");
   EXPECT_THAT(MessageOf("/a"), HasSubstr("images.txt:2: quaternion of norm 2, expected 1"));
+  // A number that stays none, whatever follows it.
+  Write("a/images.txt", "# header\n3 1 0 0 0 1 2 3 7 a.png\n1 2 -5 3 4 -1\n");
+  EXPECT_THAT(MessageOf("/a"), HasSubstr("images.txt:3"));
   Write("a/images.txt", images);
   Write("a/points3D.txt", "40 1 2 3 255 0 256 1\n");
   EXPECT_THAT(MessageOf("/a"), HasSubstr("points3D.txt:1: expected POINT3D_ID"));

@@ -47,6 +47,14 @@ TEST_F(RigConfig, OfColmapIsRead) {
   EXPECT_EQ(rig[1].camera->params[1], 610);
 }
 
+TEST_F(RigConfig, RotationsAreWXYZ) {
+  const std::string rig =
+      R"([{"cameras": [{"image_prefix": "a/", "cam_from_rig_rotation": [0.5, -0.5, 0.5, 0.5]},
+                                           {"image_prefix": "b/", "ref_sensor": true}]}])";
+  const Eigen::Quaterniond rotation = Read(rig)->at(1).cam_from_rig.rotation;
+  EXPECT_TRUE(rotation.coeffs().isApprox(Eigen::Vector4d(-0.5, 0.5, 0.5, 0.5), 1e-12)) << rotation.coeffs();
+}
+
 TEST_F(RigConfig, WhatIsWrittenIsRead) {
   auto rig = *Read(kStereo);
   const std::string text = RigConfigJson(rig);
