@@ -54,9 +54,8 @@ double Log10NumDocumentsByChance(const Vocabulary& vocabulary, const BagOfWords&
   double shared = 0;
   for (const WordCount& entry : bag) {
     const std::vector<Posting>& postings = vocabulary.inverted_files[entry.word];
-    if (vocabulary.idf[entry.word] <= 0) continue;
     const double p = -std::expm1(length * std::log1p(-static_cast<double>(postings.size()) / num_documents));
-    if (p <= 0 || p >= 1) continue;
+    if (!(p > 0 && p < 1)) continue;  // a word of no image, or of all
     words.push_back({p, -std::log(p)});
     const auto at = std::lower_bound(postings.begin(), postings.end(), document,
                                      [](const Posting& posting, int32_t d) { return posting.document < d; });

@@ -116,6 +116,31 @@ TEST(RerankPlaces, ScoresTheSameImageOneAlsoTurned) {
   }
 }
 
+// Of a camera that moved sideways, epipolar lines are level.
+TEST(RerankPlaces, CountsWhatLiesOnItsEpipolarLine) {
+  const Room room(1);
+  const PlaceView query = room.View(0, 0);
+  PlaceView aside = room.View(-1, 0);
+  const int num_all = VerifyPlace(query, aside, {}).num_inliers;
+  ASSERT_GT(num_all, 60);
+  for (size_t i = 0; i < aside.bearings.size(); i += 4)
+    aside.bearings[i] = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * aside.bearings[i];
+  const int num_left = VerifyPlace(query, aside, {}).num_inliers;
+  EXPECT_LT(num_left, 0.85 * num_all);
+  EXPECT_GT(num_left, 0.65 * num_all);
+}
+
+TEST(RerankPlaces, NeedsAsManyInliersAsItIsTold) {
+  const Room room(1);
+  const PlaceView view = room.View(0, 0);
+  RerankOptions options;
+  options.min_num_inliers = VerifyPlace(view, view, options).num_inliers;
+  ASSERT_EQ(options.min_num_inliers, static_cast<int>(view.bearings.size()));
+  EXPECT_TRUE(VerifyPlace(view, view, options).is_verified());
+  ++options.min_num_inliers;
+  EXPECT_FALSE(VerifyPlace(view, view, options).is_verified());
+}
+
 TEST(RerankPlaces, LeavesWhatIsNotVerifiedAsTheWordsHadIt) {
   const Room room(1), other(2);
   const auto places =

@@ -168,6 +168,7 @@ TEST(VocabularyTree, FileRoundTripKeepsEverything) {
   EXPECT_EQ(read->inverted_files, written.inverted_files);
   EXPECT_EQ(read->document_ids, written.document_ids);
   EXPECT_EQ(read->idf, written.idf);
+  EXPECT_EQ(read->document_num_words, (std::vector<int32_t>{2, 2}));
   EXPECT_EQ(read->branching, 2);
   EXPECT_EQ(read->depth, 3);
 }
