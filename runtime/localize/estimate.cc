@@ -130,14 +130,6 @@ int NumIterations(size_t num_inliers, size_t num_measurements, int sample_size,
                                      static_cast<double>(options.max_num_ransac_iterations)));
 }
 
-PooledVector<PoseMeasurement> Select(std::span<const PoseMeasurement> measurements,
-                                     std::span<const int> indices) {
-  PooledVector<PoseMeasurement> selected;
-  selected.reserve(indices.size());
-  for (const int i : indices) selected.push_back(measurements[i]);
-  return selected;
-}
-
 struct ScoredPose {
   PoseEstimate estimate;
   double score = 0;  // sum of truncated errors
@@ -245,7 +237,8 @@ PooledVector<PoseEstimate> EstimatePoses(std::span<const PoseMeasurement> measur
       Pose local = pose;
       PooledVector<int> inliers = Inliers(measurements, pose, limit);
       for (int round = 0; round < 3 && inliers.size() >= kMinNumInliers; ++round) {
-        const auto refined = RefinePose(Select(measurements, inliers), local, local_options, up, work);
+        const auto refined =
+            RefinePose(SelectMeasurements(measurements, inliers), local, local_options, up, work);
         const double refined_score = refined ? Score(measurements, *refined, limit, score, work) : score;
         if (!(refined_score < score)) break;
         local = *refined;
@@ -287,7 +280,8 @@ std::optional<PoseEstimate> EstimateOtherPose(std::span<const PoseMeasurement> m
       indices.push_back(static_cast<int>(i));
     }
   }
-  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed, up, work);
+  auto other =
+      EstimatePose(SelectMeasurements(measurements, indices), options, refine_options, seed, up, work);
   if (!other) return std::nullopt;
   for (int& i : other->inliers) i = indices[i];
   return other;

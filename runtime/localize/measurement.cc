@@ -172,4 +172,12 @@ PooledVector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const L
   return measurements;
 }
 
+PooledVector<PoseMeasurement> SelectMeasurements(std::span<const PoseMeasurement> measurements,
+                                                 std::span<const int> indices) {
+  PooledVector<PoseMeasurement> selected;
+  selected.reserve(indices.size());
+  for (const int i : indices) selected.push_back(measurements[i]);
+  return selected;
+}
+
 }  // namespace cairn

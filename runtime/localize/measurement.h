@@ -127,5 +127,8 @@ struct PoseMeasurement {
 // REQUIRES: the keypoints have rays, the landmarks are in the set
 PooledVector<PoseMeasurement> MakeMeasurements(const Sighting& sighting, const LandmarkSet& landmarks,
                                                std::span<const Correspondence> correspondences);
+// Those at these indices, in the indices' order.
+PooledVector<PoseMeasurement> SelectMeasurements(std::span<const PoseMeasurement> measurements,
+                                                 std::span<const int> indices);
 
 }  // namespace cairn

@@ -185,14 +185,6 @@ std::optional<Pose> LevenbergMarquardt(std::span<const PoseMeasurement> measurem
   return pose;
 }
 
-PooledVector<PoseMeasurement> Select(std::span<const PoseMeasurement> measurements,
-                                     std::span<const int> indices) {
-  PooledVector<PoseMeasurement> selected;
-  selected.reserve(indices.size());
-  for (const int i : indices) selected.push_back(measurements[i]);
-  return selected;
-}
-
 // Squared whitened residuals; infinite behind the camera.
 PooledVector<double> WhitenedSquares(std::span<const PoseMeasurement> measurements, const Pose& pose) {
   PooledVector<double> squares;
@@ -348,7 +340,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurem
     if (inliers.size() < kMinNumInliers) return std::nullopt;
     if (round > 0 && inliers == refined.inliers) break;
     refined.inliers = std::move(inliers);
-    const PooledVector<PoseMeasurement> used = Select(measurements, refined.inliers);
+    const PooledVector<PoseMeasurement> used = SelectMeasurements(measurements, refined.inliers);
     pose = LevenbergMarquardt(used, *pose, std::numeric_limits<double>::infinity(),
                               options.max_num_refine_iterations, {up, variance_unit(used)}, work);
     if (!pose) return std::nullopt;
@@ -359,7 +351,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(std::span<const PoseMeasurem
         std::max(1e-6, truncation * VarianceFromSum(sum, static_cast<int>(refined.inliers.size())));
     if (!std::isfinite(refined.noise_variance)) return std::nullopt;
   }
-  const PooledVector<PoseMeasurement> used = Select(measurements, refined.inliers);
+  const PooledVector<PoseMeasurement> used = SelectMeasurements(measurements, refined.inliers);
   const double unit = variance_unit(used);
   const NormalEquations equations =
       BuildNormalEquations(used, *pose, std::numeric_limits<double>::infinity(), {up, unit});

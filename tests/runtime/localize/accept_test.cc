@@ -11,6 +11,10 @@ TEST(JudgeGuided, NoMoreThanByChanceIsRefused) {
   EXPECT_EQ(JudgeGuided(24, 9, options).reason, NoFix::kNone);
   EXPECT_EQ(JudgeGuided(23, 9, options).reason, NoFix::kTooFewInliers);
   EXPECT_EQ(JudgeGuided(23, 9, {.min_guided_sigmas = 0}).reason, NoFix::kNone);
+  EXPECT_EQ(JudgeGuided(8, 9, {.min_guided_sigmas = 0}).reason, NoFix::kNone) << "not tested";
+  // 9 + 0.5 x 3 = 10.5
+  EXPECT_EQ(JudgeGuided(11, 9, {.min_guided_sigmas = 0.5}).reason, NoFix::kNone);
+  EXPECT_EQ(JudgeGuided(10, 9, {.min_guided_sigmas = 0.5}).reason, NoFix::kTooFewInliers);
 }
 
 // A fix at x metres with so many matches and these odds.

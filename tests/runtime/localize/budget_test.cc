@@ -1,5 +1,6 @@
 // Answers that may take so much work and no more.
 #include <limits>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -127,6 +128,41 @@ TEST(Budget, OfAnImageIsKeptWhateverItIs) {
     EXPECT_LT(CenterErrorM(found.cam_from_world, PosterQueryPose()), 0.05);
   }
   EXPECT_GE(num_fixes, 4);
+}
+
+TEST(Budget, LandmarksAreTakenFromTheMapOnce) {
+  LocalizerOptions options;
+  options.accept.min_num_matches = 100'000;  // no attempt goes further
+  const Localizer localizer(RoomMap(), options);
+  const Query query =
+      *localizer.QueryFromFeatures(RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {}, 3), Room().camera);
+  std::vector<LandmarkIdx> some(700);
+  std::iota(some.begin(), some.end(), 0);
+  const Localization none = *localizer.LocalizeAmong(query, Scope::kVotes, some, std::nullopt);
+  EXPECT_EQ(none.reason, NoFix::kTooFewMatches);
+  EXPECT_GT(none.num_matches, 10);
+  EXPECT_EQ(query.work->num(Work::kLandmark), 700);
+  EXPECT_EQ(query.work->num(Work::kDescriptorPair), 700 * std::ssize(query.features.keypoints));
+}
+
+// Matches that agree on nothing take half of what is left when they are there; the rest is for what makes a
+// fix sure.
+TEST(Budget, FirstPosesTakeHalfAtMost) {
+  const Features features = RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {.num_swapped_ratio = 1}, 3);
+  std::vector<LandmarkIdx> all(Room().points.size());
+  std::iota(all.begin(), all.end(), 0);
+  constexpr double kBudgetMs = 8;
+  const Localizer localizer(RoomMap(), WithBudget(kBudgetMs));
+  const Query query = *localizer.QueryFromFeatures(features, Room().camera);
+  EXPECT_EQ(localizer.LocalizeAmong(query, Scope::kAll, all, std::nullopt)->reason, NoFix::kOverBudget);
+  double of_poses_ms = 0;
+  for (const Work work : {Work::kSample, Work::kScore, Work::kRefine})
+    of_poses_ms += 1e-9 * static_cast<double>(query.work->num(work) * WorkBudget::PicosecondsOf(work));
+  const double after_ms = 1e-9 * static_cast<double>(query.work->num(Work::kMatchPair) *
+                                                     WorkBudget::PicosecondsOf(Work::kMatchPair));
+  const double left_ms = kBudgetMs - (query.work->spent_ms() - of_poses_ms - after_ms);
+  EXPECT_LE(of_poses_ms, 0.5 * left_ms + kRounding);
+  EXPECT_GT(of_poses_ms, 0.48 * left_ms);
 }
 
 // A frame that finds nothing by what was expected has what is left for another try.

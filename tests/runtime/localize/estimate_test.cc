@@ -50,6 +50,17 @@ TEST(Estimate, StopsSoonWhereAllAgree) {
   EXPECT_EQ(estimate->inliers.size(), 100u);
 }
 
+TEST(Estimate, PointsMayBeAsNearAsTheyLike) {
+  auto measurements = MakeScene(40, 20, 4);
+  Pose truth = kTruth;
+  truth.translation *= 0.05;
+  for (PoseMeasurement& measurement : measurements) measurement.point *= 0.05;  // 10 to 40 cm away
+  const auto estimate = EstimatePose(measurements, {}, {}, 0);
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(CenterErrorM(estimate->cam_from_world, truth), 0.005);
+  EXPECT_GE(estimate->inliers.size(), 39u);
+}
+
 TEST(Estimate, SameSeedSameResult) {
   const auto measurements = MakeScene(40, 100, 3);
   const auto first = EstimatePose(measurements, {}, {}, 5);

@@ -1,8 +1,10 @@
+#include <memory>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
 #include "core/base/pooled.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
@@ -84,6 +86,16 @@ TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
   const Wall wall = MakeWall(false, {}, 0.1);  // 20 px: looked for within 61
   EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
   EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
+}
+
+// Each landmark is projected, and costs one more than the keypoints near it: here its own, and another 5 px
+// beside it, out of two.
+TEST(MatchGuided, CountsWhatItLooksAt) {
+  Wall wall = MakeWall(false, {{5, 0}, {25, 0}});
+  wall.query.work = std::make_shared<WorkBudget>();
+  MatchGuided(wall.query, wall.landmarks, {}, {});
+  EXPECT_EQ(wall.query.work->num(Work::kProject), kSide * kSide);
+  EXPECT_EQ(wall.query.work->num(Work::kNear), 3 * kSide * kSide);
 }
 
 // A first pose that enough matches led to.

@@ -1,6 +1,9 @@
 #include "runtime/localize/localizer.h"
 
+#include <cmath>
+#include <limits>
 #include <thread>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +11,7 @@
 #include "core/base/pooled.h"
 #include "core/files/file.h"
 #include "core/seal/map_seal.h"
+#include "core/work/work_budget.h"
 #include "runtime/localize/accept.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
@@ -374,6 +378,126 @@ TEST(Localizer, OptionsAreDescribedOnceEach) {
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
   EXPECT_TRUE(CheckOptions(DescribeOptions(&options)).ok());
+}
+
+// A value at the end of its range is allowed, the next one beyond it is not.
+TEST(Localizer, OptionsHaveTheirRanges) {
+  LocalizerOptions options;
+  options.budget_ms = 5;
+  const auto is_allowed = [&] { return CheckOptions(DescribeOptions(&options)).ok(); };
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  struct Range {
+    double* value;
+    double least, most;
+  };
+  MeasurementOptions& measurement = options.measurement;
+  RetrieveOptions& retrieve = options.retrieve;
+  MatchOptions& match = options.match;
+  EstimateOptions& estimate = options.estimate;
+  RefineOptions& refine = options.refine;
+  AcceptOptions& accept = options.accept;
+  // clang-format off
+  for (const auto& [value, least, most] : std::vector<Range>{
+           {&measurement.keypoint_sigma_px, 1e-3, kAny}, {&measurement.keypoint_sigma_per_scale, 0, kAny},
+           {&retrieve.min_score_ratio, 0, 1},            {&retrieve.max_word_angle_rad, 1e-3, kAny},
+           {&retrieve.max_word_ratio, 1e-3, 1},          {&retrieve.prior_distance_m, 0, kAny},
+           {&retrieve.prior_angle_deg, 0, 180},          {&match.max_ratio, 1e-3, 1},
+           {&match.max_angle_rad, 1e-3, kAny},           {&match.guided_radius_px, 0.1, kAny},
+           {&match.guided_radius_sigmas, 0, kAny},       {&match.guided_max_angle_rad, 1e-3, kAny},
+           {&match.guided_max_scale_ratio, 1, kAny},     {&match.guided_widest, 1, 64},
+           {&estimate.max_error_px, 1e-3, kAny},         {&estimate.confidence, 0.01, 0.999999},
+           {&refine.robust_scale, 1e-3, kAny},           {&refine.inlier_chi_square, 1e-3, kAny},
+           {&refine.covariance_scale, 1e-9, kAny},       {&refine.keypoint_correlation, 0, 1},
+           {&refine.systematic_sigma_m, 0, kAny},        {&refine.systematic_sigma_deg, 0, kAny},
+           {&accept.min_kept_ratio, 0, 1},               {&accept.min_guided_sigmas, 0, kAny},
+           {&accept.min_probability, 0, 1},              {&accept.max_sigma_m, 1e-6, kAny},
+           {&accept.max_sigma_deg, 1e-6, kAny},          {&accept.max_up_sigmas, 0.1, kAny},
+           {&accept.max_distance_from_survey_m, 0, kAny}, {&accept.max_second_pose_ratio, 0, 1},
+           {&accept.second_pose_distance_m, 1e-6, kAny}, {&accept.second_pose_angle_deg, 1e-6, kAny},
+           {&options.min_look_alike_odds, 1, kAny},      {&options.floor_up_sigma_deg, 0.01, 90},
+           {&options.budget_ms, 0, kAny},                {&options.core_speed, 1e-3, 1e3}}) {
+    // clang-format on
+    SCOPED_TRACE(testing::Message() << "[" << least << ", " << most << "]");
+    const double usual = *value;
+    for (const double end : {least, most}) {
+      if (end == kAny) continue;
+      *value = end;
+      EXPECT_TRUE(is_allowed());
+      *value = std::nextafter(end, end == least ? -kAny : kAny);
+      EXPECT_FALSE(is_allowed());
+    }
+    *value = usual;
+  }
+  for (const auto& [value, least, most] :
+       std::vector<std::tuple<int*, int, int>>{{&retrieve.max_num_candidates, 1, 0},
+                                               {&retrieve.max_num_regions, 1, 0},
+                                               {&match.guided_num_images, 0, 0},
+                                               {&match.guided_sure_num_inliers, 0, 0},
+                                               {&match.guided_max_num_rounds, 1, 0},
+                                               {&estimate.min_num_ransac_iterations, 1, 0},
+                                               {&estimate.max_num_ransac_iterations, 1, 0},
+                                               {&estimate.max_num_first_poses, 1, 100},
+                                               {&refine.max_num_refine_iterations, 1, 0},
+                                               {&accept.min_num_features, 4, 0},
+                                               {&accept.min_num_matches, 4, 0},
+                                               {&accept.min_num_unguided_inliers, 4, 0},
+                                               {&accept.min_num_inliers, 5, 0},
+                                               {&accept.spread_grid, 1, 1000},
+                                               {&accept.min_num_cells, 1, 0},
+                                               {&accept.num_second_pose_iterations, 1, 0},
+                                               {&options.sure_num_unguided_inliers, 0, 0},
+                                               {&options.fall_back_max_num_landmarks, 0, 0}}) {
+    const int usual = *value;
+    *value = least;
+    EXPECT_TRUE(is_allowed()) << least;
+    *value = least - 1;
+    EXPECT_FALSE(is_allowed()) << least;
+    if (most > 0) {
+      *value = most;
+      EXPECT_TRUE(is_allowed()) << most;
+      *value = most + 1;
+      EXPECT_FALSE(is_allowed()) << most;
+    }
+    *value = usual;
+  }
+}
+
+// As many unguided inliers as are asked for are enough, and one less is not.
+TEST(Localizer, AFixThatIsNotSureIsHeldAgainstOtherLandmarks) {
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  const auto localize = [&](int sure_num) {
+    LocalizerOptions options;
+    options.sure_num_unguided_inliers = sure_num;
+    const Localizer localizer(RoomMap(), options);
+    const Query query = *localizer.QueryFromFeatures(features, Room().camera);
+    const Localization found = *localizer.LocalizeQuery(query, std::nullopt);
+    return std::pair(found, query.work->num(Work::kAttempt));
+  };
+  const auto [sure, num_attempts] = localize(20);
+  ASSERT_TRUE(sure.has_fix());
+  EXPECT_EQ(num_attempts, 1);
+  EXPECT_EQ(localize(sure.num_unguided_inliers).second, 1);
+  EXPECT_GT(localize(sure.num_unguided_inliers + 1).second, 1);
+}
+
+TEST(Localizer, AVotedFixThatIsNotSureIsHeldAgainstOtherLandmarks) {
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const Features features = RenderFeatures(Room(), truth, {.detection_ratio = 1}, 3);
+  std::vector<LandmarkIdx> voted;  // a third of all
+  for (LandmarkIdx i = 0; i < static_cast<LandmarkIdx>(Room().points.size()); i += 3) voted.push_back(i);
+  const auto localize = [&](int sure_num) {
+    LocalizerOptions options;
+    options.sure_num_unguided_inliers = sure_num;
+    const Localizer localizer(RoomMap(), options);
+    return *localizer.LocalizeVoted(*localizer.QueryFromFeatures(features, Room().camera), voted);
+  };
+  const Localization sure = localize(20);
+  ASSERT_TRUE(sure.has_fix()) << sure.message;
+  EXPECT_EQ(sure.scope, Scope::kVotes);
+  EXPECT_EQ(localize(sure.num_unguided_inliers).scope, Scope::kVotes);
+  const Localization better = localize(sure.num_unguided_inliers + 1);
+  EXPECT_EQ(better.scope, Scope::kRegions);
+  EXPECT_GT(better.num_unguided_inliers, 2 * sure.num_unguided_inliers);
 }
 
 TEST(Map, CameraIsChosenBySizeOnlyIfOneFits) {

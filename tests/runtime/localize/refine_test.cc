@@ -158,6 +158,25 @@ TEST(Refine, NormalisedErrorSquaredHasMeanSix) {
   }
 }
 
+// Of n inliers, 2 n residuals for 6 parameters, and 2 less for a mean of the errors' squares.
+TEST(Refine, TheNoiseIsThatOfTheInliersResiduals) {
+  Random random(7);
+  auto measurements = MakeScene(Truth(), 12, 0.4, 0, random);
+  for (PoseMeasurement& measurement : measurements) measurement.ray.sigma_px = 2;
+  RefineOptions options = kIndependent;
+  options.inlier_chi_square = 1e3;  // nothing is cut off
+  const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), options);
+  ASSERT_TRUE(refined);
+  ASSERT_EQ(refined->inliers.size(), measurements.size());
+  double sum = 0;
+  for (const PoseMeasurement& measurement : measurements) {
+    const Eigen::Vector2d off =
+        (refined->cam_from_world * measurement.point).hnormalized() - measurement.ray.ray;
+    sum += (500 * off / 2).squaredNorm();
+  }
+  EXPECT_NEAR(refined->noise_variance, sum / (2 * 12 - 6 - 2), 1e-9);
+}
+
 TEST(Refine, LandmarkCovarianceWeighsAndCounts) {
   // Half of the landmarks are off by 5 cm and say so.
   Random random(4);

@@ -47,6 +47,10 @@ TEST(Retrieve, RegionsAreOrderedByTheVotesOfTheirCandidates) {
   EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{2, 0.5}, {0, 0.4}}, {}), ElementsAre(1, 0));
   EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{1, 0.5}}, {}),
               ElementsAre(0, 1));  // tie: the smaller index
+  // Of region 0 two candidates, of region 1 the better one alone: 0.9 and 0.5.
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{1, 0.5}, {0, 0.4}}, {}), ElementsAre(0, 1));
+  EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{0, 0.5}, {2, 0.3}, {1, 0.1}, {2, 0.3}}, {}),
+              ElementsAre(1, 0));
   RetrieveOptions one;
   one.max_num_regions = 1;
   EXPECT_THAT(*RegionsOfCandidates(*map, std::vector<Candidate>{{2, 0.5}, {0, 0.4}}, one), ElementsAre(1));
@@ -74,6 +78,36 @@ TEST(Retrieve, NearestViewsAreNearByPlaceAndAngle) {
   EXPECT_THAT(images(*NearestViews(*map, PoseAt({3, 0, 0}, 90), 1, 15, 1)), ElementsAre(2));
   EXPECT_THAT(images(*NearestViews(*map, PoseAt({0.5, 0, 0}, 90), 1, 15, 9)),
               ElementsAre(0, 1, 2));  // as far
+}
+
+// A metre counts as much as 15 degrees: the first image is half a metre away, the second one turned.
+TEST(ImageNearFix, IsTheNearestByPlaceAndAngle) {
+  const auto nearest = [](double turned_deg, const Pose& camera_from_given, bool has_fix) {
+    MapRows rows;
+    Camera camera;
+    camera.width = camera.height = 100;
+    camera.params = {100, 50, 50};
+    rows.cameras = {camera};
+    rows.images = {{.image_id = 1, .camera_id = 1, .cam_from_world = PoseAt({0.5, 0, 0}, 90)},
+                   {.image_id = 2, .camera_id = 1, .cam_from_world = PoseAt({0, 0, 0}, 90 + turned_deg)}};
+    rows.camera_from_given = camera_from_given;
+    const Pose found_at = camera_from_given.Inverse() * PoseAt({0, 0, 0}, 90);
+    Localization found;
+    found.reason = has_fix ? NoFix::kNone : NoFix::kAmbiguous;
+    if (has_fix) {
+      found.cam_from_world = found_at;
+    } else {
+      found.possible_poses = {found_at, PoseAt({9, 0, 0}, 90)};
+    }
+    return *ImageNearFix(**Map::FromRows(rows), found);
+  };
+  const Pose half_a_metre_ahead{Eigen::Quaterniond::Identity(), {0, 0, 0.5}};
+  for (const Pose& camera_from_given : {Pose(), half_a_metre_ahead}) {
+    for (const bool has_fix : {true, false}) {
+      EXPECT_EQ(nearest(7.25, camera_from_given, has_fix), 1);
+      EXPECT_EQ(nearest(7.75, camera_from_given, has_fix), 0);
+    }
+  }
 }
 
 // Each image a block of its own, or nearly: those that cannot be among the nearest are not read.
@@ -111,6 +145,17 @@ TEST(Retrieve, PriorChoosesImagesByPlaceAndAngle) {
   EXPECT_EQ(near[0].image, 1);
   EXPECT_EQ(near[1].image, 0);
   EXPECT_TRUE(RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, -90), 0.3, 5}, options)->empty());
+  // Within 20 + 3 * 5 = 35 degrees.
+  EXPECT_EQ(RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, 124), 0.3, 5}, options)->size(), 2u);
+  EXPECT_TRUE(RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, 126), 0.3, 5}, options)->empty());
+  EXPECT_EQ(RetrieveByPrior(*map, {PoseAt({0.95, 0, 0}, 90), 0.3, 5}, options)->size(), 3u);
+  // The nearer scores 1 / (1 + 0.1 m).
+  EXPECT_NEAR(near[0].score, 1 / 1.1, 1e-9);
+  EXPECT_NEAR(near[1].score, 1 / 1.9, 1e-9);
+  options.max_num_candidates = 1;
+  const auto one = *RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, 90), 0.3, 5}, options);
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_EQ(one[0].image, 1);
 }
 
 TEST(Retrieve, CovisibleLandmarksComeFromTheImagesThatShareMost) {

@@ -166,6 +166,24 @@ TEST(Rig, ACameraThatRecognizesNothingIsSearchedForWhatTheOthersPutThere) {
             static_cast<int>(two[0].features.keypoints.size() + two[1].features.keypoints.size()));
 }
 
+// One looks ahead and the other behind: what each recognizes is of its own regions.
+TEST(Rig, EachCameraIsMatchedWithWhatItShows) {
+  const Pose truth = PoseAt({0.4, 0.3, 1.2}, 20);
+  LocalizerOptions options;
+  options.retrieve.max_num_regions = 1;
+  options.fall_back_to_all = false;
+  Localizer localizer(RoomMap(), options);
+  const std::vector<RigFeatures> images = See(truth, Mast(2), {}, 9);
+  int num_alone = 0;
+  for (const RigFeatures& image : images)
+    num_alone += localizer.LocalizeFeatures(image.features, image.camera)->num_unguided_inliers;
+  const Localization found = *localizer.LocalizeRigFeatures(images);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_EQ(found.scope, Scope::kRegions);
+  EXPECT_GT(found.num_unguided_inliers, 0.9 * num_alone);
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.03);
+}
+
 TEST(Rig, ABlindCameraDoesNoHarm) {
   const Pose truth = PoseAt({0.4, 0.3, 1.2}, 20);
   std::vector<RigFeatures> images = See(truth, Mast(3), {}, 9);
