@@ -372,7 +372,7 @@ Result<Localization> Localizer::Try(const Sighting& sighting, const Attempt& att
     if (static_cast<double>(max_num) < least_part * static_cast<double>(idx.size())) work->GiveUp();
     if (is_thinned || !is_known || std::ssize(idx) > max_num) {
       is_thinned = is_thinned || std::ssize(idx) > max_num;
-      if (!Spend(work, Work::kLandmark, all ? 0 : std::min<int64_t>(std::ssize(idx), max_num)))
+      if (!Spend(work, Work::kLandmark, all && !is_thinned ? 0 : std::min<int64_t>(std::ssize(idx), max_num)))
         return OverBudget(*work, std::move(localization));
       CAIRN_ASSIGN_OR_RETURN(
           landmarks, all && !is_thinned ? map_->AllLandmarks() : map_->Gather(Thinned(idx, max_num), true));

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
@@ -141,6 +142,11 @@ TEST(PassingServo, IsLessExactingOnItsWay) {
   EXPECT_EQ(passing.arrive_distance_ratio, 0.05);
   EXPECT_EQ(passing.arrive_heading_deg, 6);
   EXPECT_EQ(passing.max_speed_m_s, 0.7);
+}
+
+TEST(PassingServo, RangesOfItsOptions) {
+  ExpectLimits<PassOptions>({{"pass_distance_ratio", "0.0001", "0.00009", "1", "1.001"},
+                             {"pass_heading_deg", "0.001", "0.0009", "45", "45.001"}});
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "runtime/localize/localization.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/map.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
@@ -410,6 +411,27 @@ TEST(PlaceBelief, RefusesWhatItCannotUse) {
   MapRows empty;
   empty.name = "empty";
   EXPECT_EQ(PlaceBelief::Make(*Map::FromRows(empty)).error().code, ErrorCode::kNoData);
+}
+
+TEST(PlaceBelief, OptionsHaveTheirRanges) {
+  ExpectLimits<PlaceBeliefOptions>({{"fix_ratio", "1e-9", "9e-10", "0.89", "0.891"},
+                                    {"wrong_fix_ratio", "1e-9", "9e-10", "0.009", "0.0091"},
+                                    {"look_alike_fix_ratio", "1e-9", "9e-10", "0.1", "0.101"},
+                                    {"foreign_fix_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"max_fix_odds", "1", "0.999"},
+                                    {"misled_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"least_new_ratio", "1e-9", "9e-10", "1", "1.001"},
+                                    {"likeness_weight", "0", "-0.001"},
+                                    {"elsewhere_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"leave_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"return_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"kidnapped_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"},
+                                    {"reach_links", "1", "0.999", "100", "100.1"},
+                                    {"way_sigma_ratio", "0", "-0.001"},
+                                    {"turn_sigma_ratio", "0", "-0.001"},
+                                    {"way_sigma_m", "1e-9", "9e-10"},
+                                    {"turn_sigma_deg", "1e-9", "9e-10"},
+                                    {"map_up_sigma_deg", "1e-9", "9e-10", "90", "90.001"}});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/localize/measurement.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
@@ -78,6 +79,10 @@ TEST(PlaceModel, ViewsOfImagesShowTheirLandmarks) {
   EXPECT_EQ(view.packed.size(), static_cast<int>(image.landmarks.size()));
   const Eigen::Vector3d point = image.cam_from_world * ModelRoom().points[image.landmarks[7]];
   EXPECT_LT((view.bearings[7] - point.normalized()).norm(), 1e-9);
+}
+
+TEST(PlaceModel, OptionsHaveTheirRanges) {
+  ExpectLimits<PlaceModelOptions>({{"score_exponent", "0.001", "0.0009", "100", "100.001"}});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/geometry/pose.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/drive/servo_scene.h"
 
 namespace cairn {
@@ -185,6 +186,16 @@ TEST(PlanarEpipoles, MarksMatchesThatAreNotFiniteAsOutliers) {
   EXPECT_EQ(found->is_inlier[0], 0);
   EXPECT_EQ(found->is_inlier[1], 1);
   EXPECT_EQ(found->num_inliers, static_cast<int>(rays.size()) - 1);
+}
+
+TEST(PlanarEpipoles, OptionsHaveTheirRanges) {
+  ExpectLimits<PlanarEpipolesOptions>({{"noise_px", "0.01", "0.009", "10", "10.001"},
+                                       {"focal_ratio", "0.2", "0.199", "5", "5.001"},
+                                       {"focal_error_ratio", "0.001", "0.0009", "0.5", "0.501"},
+                                       {"min_num_inliers", "4", "3"},
+                                       {"min_inlier_ratio", "0", "-0.001", "1", "1.001"},
+                                       {"min_spread_px", "0", "-0.001", "10000", "10000.1"},
+                                       {"num_samples", "1", "0", "100000", "100001"}});
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "core/base/pooled.h"
 #include "core/geometry/pose.h"
 #include "runtime/localize/retrieve.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
@@ -190,6 +191,13 @@ TEST(Retrieve, SparseMapsLeadToKeptImagesAlone) {
   EXPECT_THAT(images(rows), ElementsAre(0, 1, 2, 3, 4, 5, 6));
   rows.documents = "kept";
   EXPECT_THAT(images(rows), ElementsAre(1, 2, 3, 6));
+}
+
+TEST(PlanRoute, OptionsHaveTheirRanges) {
+  ExpectLimits<RouteOptions>({{"lost_ratio", "0", "-0.001", "1", "1.001"},
+                              {"faint_link_inliers", "0.1", "0.09"},
+                              {"look_anew_m", "0", "-0.001"},
+                              {"wrong_place_m", "0", "-0.001"}});
 }
 
 }  // namespace

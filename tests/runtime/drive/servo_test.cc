@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "core/geometry/pose.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/drive/servo_scene.h"
 
 namespace cairn {
@@ -308,6 +309,26 @@ TEST(Servo, SameMatchesSameCommands) {
   const Drive one = DriveTo(scene, {{-1, 0.3}, 0.2}, {}), two = DriveTo(scene, {{-1, 0.3}, 0.2}, {});
   EXPECT_EQ(one.end.position, two.end.position);
   EXPECT_EQ(one.num_steps, two.num_steps);
+}
+
+TEST(Servo, OptionsHaveTheirRanges) {
+  ExpectLimits<ServoOptions>({{"max_speed_m_s", "0.001", "0.0009", "10", "10.001"},
+                              {"max_turn_deg_s", "0.1", "0.09", "720", "720.1"},
+                              {"step_s", "0.001", "0.0009", "10", "10.001"},
+                              {"speed_gain", "0.001", "0.0009", "10", "10.001"},
+                              {"turn_gain", "0.001", "0.0009", "10", "10.001"},
+                              {"approach_gain", "1.5", "1.499", "10", "10.001"},
+                              {"max_heading_deg", "5", "4.999", "60", "60.001"},
+                              {"max_heading_error_deg", "1", "0.999", "90", "90.001"},
+                              {"arrive_heading_deg", "0.001", "0.0009", "45", "45.001"},
+                              {"arrive_distance_ratio", "0.0001", "0.00009", "1", "1.001"},
+                              {"patience_commands", "1", "0"},
+                              {"max_retreat_ratio", "0.001", "0.0009", "10", "10.001"},
+                              {"min_num_matches_to_turn", "4", "3"},
+                              {"scene_distance_m", "0.01", "0.009", "1000", "1000.1"},
+                              {"camera_ahead_m", "-2", "-2.001", "2", "2.001"},
+                              {"camera_left_m", "-2", "-2.001", "2", "2.001"},
+                              {"camera_turn_deg", "-45", "-45.001", "45", "45.001"}});
 }
 
 }  // namespace

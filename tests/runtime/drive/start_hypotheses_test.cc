@@ -13,6 +13,7 @@
 #include "core/vocabulary/document_scores.h"
 #include "core/world/appearance_graph.h"
 #include "runtime/map/appearance_map.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/visual_map/visual_memory.h"
 
 namespace cairn {
@@ -315,6 +316,16 @@ TEST(FindPaths, WeighsLinksMatchesAndEntropies) {
   EXPECT_NEAR(PlanRoute(*map, 0, 3, {.weight = "entropy"})->cost, 0.3 + 0.1 + 0.3, 1e-9);
   EXPECT_NEAR(PlanRoute(*map, 0, 3, {.weight = "matches"})->cost, 3.0 / 500, 1e-9);
   EXPECT_EQ(PlanRoute(*map, 0, 3, {.weight = "hope"}).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(StartHypotheses, OptionsHaveTheirRanges) {
+  ExpectLimits<StartHypothesesOptions>({{"min_score_ratio", "0.001", "0.0009", "1", "1.001"},
+                                        {"max_num_hypotheses", "1", "0"},
+                                        {"reach_links", "1", "0"},
+                                        {"uniform_ratio", "1e-9", "9e-10", "1", "1.001"},
+                                        {"switch_margin", "0", "-0.001", "1", "1.001"},
+                                        {"min_reachable_ratio", "0", "-0.001", "1", "1.001"},
+                                        {"wrong_place_m", "0", "-0.001"}});
 }
 
 }  // namespace

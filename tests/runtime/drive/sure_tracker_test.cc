@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
@@ -146,6 +147,12 @@ TEST(SureTracker, RefusesWhatCannotBe) {
   const auto map = *Map::FromRows(empty);
   EXPECT_EQ(SureTracker::Make(map, {}, {}, {.min_place_probability = 0.9}).error().code, ErrorCode::kNoData);
   EXPECT_TRUE(SureTracker::Make(map, {}, {}, {}).ok());
+}
+
+TEST(SureTracker, OptionsHaveTheirRanges) {
+  ExpectLimits<SureTrackerOptions>({{"min_place_probability", "0", "-0.001", "0.999999999", "0.9999999995"},
+                                    {"look_anew_s", "0", "-0.001"},
+                                    {"place_leave_ratio", "1e-9", "9e-10", "0.999999999", "0.9999999995"}});
 }
 
 }  // namespace

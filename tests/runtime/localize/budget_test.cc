@@ -1,6 +1,9 @@
 // Answers that may take so much work and no more.
 #include <limits>
+#include <memory>
 #include <numeric>
+#include <span>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,6 +68,9 @@ TEST(Budget, OfFeaturesIsKeptWhateverItIs) {
       ++num_over;
       EXPECT_EQ(found.reason, NoFix::kOverBudget) << found.message;
       EXPECT_THAT(found.message, testing::HasSubstr("budget_ms"));
+      EXPECT_THAT(found.message, testing::HasSubstr(found.num_features == 0  ? "features alone"
+                                                    : found.num_matches == 0 ? "before landmarks were matched"
+                                                                             : "before a fix was sure"));
       EXPECT_LT(budget_ms, any.work_ms);
     }
   }
@@ -143,6 +149,58 @@ TEST(Budget, LandmarksAreTakenFromTheMapOnce) {
   EXPECT_GT(none.num_matches, 10);
   EXPECT_EQ(query.work->num(Work::kLandmark), 700);
   EXPECT_EQ(query.work->num(Work::kDescriptorPair), 700 * std::ssize(query.features.keypoints));
+}
+
+// Two images that show the same are matched with the same landmarks.
+TEST(Budget, LandmarksOfARigAreTakenFromTheMapOnce) {
+  LocalizerOptions options;
+  options.accept.min_num_matches = 100'000;
+  options.fall_back_to_all = false;
+  const Localizer localizer(RoomMap(), options);
+  const auto num_taken = [&](size_t num_images) {
+    const auto work = std::make_shared<WorkBudget>();
+    const std::vector<Query> queries(
+        num_images, *localizer.QueryFromFeatures(RenderFeatures(Room(), PoseAt({1, 0.5, 1.2}, 20), {}, 3),
+                                                 Room().camera, work));
+    const Localization none =
+        *localizer.LocalizeQuery(Sighting(std::span<const Query>(queries)), std::nullopt);
+    EXPECT_EQ(none.reason, NoFix::kTooFewMatches);
+    return work->num(Work::kLandmark);
+  };
+  EXPECT_GT(num_taken(1), 100);
+  EXPECT_EQ(num_taken(2), num_taken(1));
+}
+
+// Where not all landmarks can be matched, those that are lie evenly among them: the image shows the second
+// half alone, and of it as large a part as of all.  They are taken from the map, each.
+TEST(Budget, LandmarksAreThinnedEvenly) {
+  SyntheticRoom second_half = Room();
+  const auto num_all = static_cast<LandmarkIdx>(second_half.points.size());
+  for (LandmarkIdx i = 0; i < num_all / 2; ++i) second_half.points[i] = {0, 0, -1000};
+  const Features features = RenderFeatures(second_half, PoseAt({0, 0, 1.2}, 20), {.detection_ratio = 1}, 3);
+  std::vector<LandmarkIdx> all(num_all);
+  std::iota(all.begin(), all.end(), 0);
+  const auto localize = [&](double budget_ms) {
+    const Localizer localizer(RoomMap(), WithBudget(budget_ms));
+    const Query query = *localizer.QueryFromFeatures(features, Room().camera);
+    const int num_matches = localizer.LocalizeAmong(query, Scope::kVotes, all, std::nullopt)->num_matches;
+    const int64_t num_taken = query.work->num(Work::kLandmark);
+    return std::tuple(num_matches, query.work->num(Work::kDescriptorPair) / std::ssize(features.keypoints),
+                      num_taken);
+  };
+  const int num_matches_of_all = std::get<0>(localize(1000));
+  ASSERT_GT(num_matches_of_all, 80);
+  int num_thinned = 0;
+  for (double budget_ms = 0.3; budget_ms < 3; budget_ms *= 1.03) {
+    const auto [num_matches, num_matched_with, num_taken] = localize(budget_ms);
+    if (num_matches == 0 || num_matched_with == num_all) continue;
+    ++num_thinned;
+    const double part = static_cast<double>(num_matched_with) / num_all;
+    EXPECT_GE(part, 0.5);
+    EXPECT_NEAR(static_cast<double>(num_matches) / num_matches_of_all, part, 0.12);
+    EXPECT_GE(num_taken, num_matched_with);
+  }
+  EXPECT_GE(num_thinned, 10);
 }
 
 // Matches that agree on nothing take half of what is left when they are there; the rest is for what makes a

@@ -1,5 +1,7 @@
+#include <cmath>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -86,6 +88,42 @@ TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
   const Wall wall = MakeWall(false, {}, 0.1);  // 20 px: looked for within 61
   EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
   EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
+}
+
+// A landmark 400 / 2 px per metre away, of uncertain place along one axis, is looked for within 10 px and
+// three of its standard deviations: as far as its image moves, whichever way it does.
+TEST(MatchGuided, LooksAsFarAsTheLandmarksPlaceIsUncertain) {
+  const Eigen::Vector2d at(380, 340);  // of (0.4, 0.2, 2)
+  const auto is_found = [&](const Eigen::Vector3d& sigmas_m, const Eigen::Vector2d& aside) {
+    Random random(1);
+    LandmarkSet landmarks;
+    landmarks.idx = {0};
+    landmarks.landmarks.push_back(
+        {.position = {0.4, 0.2, 2}, .covariance = sigmas_m.cwiseAbs2().asDiagonal()});
+    landmarks.descriptors = RandomDescriptor(random);
+    Features features;
+    const Eigen::Vector2d pixel = at + aside;
+    features.keypoints = {{static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), 2, 0}};
+    features.descriptors = landmarks.descriptors;
+    Camera camera;
+    camera.width = camera.height = 600;
+    camera.model = CameraModel::kSimplePinhole;
+    camera.params = {400, 300, 300};
+    return !MatchGuided(MakeQuery(std::move(features), camera, {}), landmarks, {}, {}).empty();
+  };
+  for (const auto& [sigmas_m, moved_px] : {std::pair(Eigen::Vector3d(0, 0, 0), 0.0),
+                                           {Eigen::Vector3d(0.1, 0, 0), 20.0},
+                                           {Eigen::Vector3d(0, 0.1, 0), 20.0},
+                                           {Eigen::Vector3d(0, 0, 0.1), 20 * std::hypot(0.2, 0.1)},
+                                           {Eigen::Vector3d(0.1, 0.05, 0), 20.0}}) {
+    const double radius_px = std::hypot(10, 3 * moved_px);
+    for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), {-1, 0}, {0, 1}, {0, -1}, {0.6, 0.8}}) {
+      EXPECT_TRUE(is_found(sigmas_m, 0.99 * radius_px * way))
+          << sigmas_m.transpose() << ": " << way.transpose();
+      EXPECT_FALSE(is_found(sigmas_m, 1.01 * radius_px * way))
+          << sigmas_m.transpose() << ": " << way.transpose();
+    }
+  }
 }
 
 // Each landmark is projected, and costs one more than the keypoints near it: here its own, and another 5 px

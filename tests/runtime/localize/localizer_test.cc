@@ -1,9 +1,6 @@
 #include "runtime/localize/localizer.h"
 
-#include <cmath>
-#include <limits>
 #include <thread>
-#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,6 +13,7 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
 #include "runtime/map/block_cache.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
@@ -380,86 +378,61 @@ TEST(Localizer, OptionsAreDescribedOnceEach) {
   EXPECT_TRUE(CheckOptions(DescribeOptions(&options)).ok());
 }
 
-// A value at the end of its range is allowed, the next one beyond it is not.
 TEST(Localizer, OptionsHaveTheirRanges) {
-  LocalizerOptions options;
-  options.budget_ms = 5;
-  const auto is_allowed = [&] { return CheckOptions(DescribeOptions(&options)).ok(); };
-  constexpr double kAny = std::numeric_limits<double>::infinity();
-  struct Range {
-    double* value;
-    double least, most;
-  };
-  MeasurementOptions& measurement = options.measurement;
-  RetrieveOptions& retrieve = options.retrieve;
-  MatchOptions& match = options.match;
-  EstimateOptions& estimate = options.estimate;
-  RefineOptions& refine = options.refine;
-  AcceptOptions& accept = options.accept;
-  // clang-format off
-  for (const auto& [value, least, most] : std::vector<Range>{
-           {&measurement.keypoint_sigma_px, 1e-3, kAny}, {&measurement.keypoint_sigma_per_scale, 0, kAny},
-           {&retrieve.min_score_ratio, 0, 1},            {&retrieve.max_word_angle_rad, 1e-3, kAny},
-           {&retrieve.max_word_ratio, 1e-3, 1},          {&retrieve.prior_distance_m, 0, kAny},
-           {&retrieve.prior_angle_deg, 0, 180},          {&match.max_ratio, 1e-3, 1},
-           {&match.max_angle_rad, 1e-3, kAny},           {&match.guided_radius_px, 0.1, kAny},
-           {&match.guided_radius_sigmas, 0, kAny},       {&match.guided_max_angle_rad, 1e-3, kAny},
-           {&match.guided_max_scale_ratio, 1, kAny},     {&match.guided_widest, 1, 64},
-           {&estimate.max_error_px, 1e-3, kAny},         {&estimate.confidence, 0.01, 0.999999},
-           {&refine.robust_scale, 1e-3, kAny},           {&refine.inlier_chi_square, 1e-3, kAny},
-           {&refine.covariance_scale, 1e-9, kAny},       {&refine.keypoint_correlation, 0, 1},
-           {&refine.systematic_sigma_m, 0, kAny},        {&refine.systematic_sigma_deg, 0, kAny},
-           {&accept.min_kept_ratio, 0, 1},               {&accept.min_guided_sigmas, 0, kAny},
-           {&accept.min_probability, 0, 1},              {&accept.max_sigma_m, 1e-6, kAny},
-           {&accept.max_sigma_deg, 1e-6, kAny},          {&accept.max_up_sigmas, 0.1, kAny},
-           {&accept.max_distance_from_survey_m, 0, kAny}, {&accept.max_second_pose_ratio, 0, 1},
-           {&accept.second_pose_distance_m, 1e-6, kAny}, {&accept.second_pose_angle_deg, 1e-6, kAny},
-           {&options.min_look_alike_odds, 1, kAny},      {&options.floor_up_sigma_deg, 0.01, 90},
-           {&options.budget_ms, 0, kAny},                {&options.core_speed, 1e-3, 1e3}}) {
-    // clang-format on
-    SCOPED_TRACE(testing::Message() << "[" << least << ", " << most << "]");
-    const double usual = *value;
-    for (const double end : {least, most}) {
-      if (end == kAny) continue;
-      *value = end;
-      EXPECT_TRUE(is_allowed());
-      *value = std::nextafter(end, end == least ? -kAny : kAny);
-      EXPECT_FALSE(is_allowed());
-    }
-    *value = usual;
-  }
-  for (const auto& [value, least, most] :
-       std::vector<std::tuple<int*, int, int>>{{&retrieve.max_num_candidates, 1, 0},
-                                               {&retrieve.max_num_regions, 1, 0},
-                                               {&match.guided_num_images, 0, 0},
-                                               {&match.guided_sure_num_inliers, 0, 0},
-                                               {&match.guided_max_num_rounds, 1, 0},
-                                               {&estimate.min_num_ransac_iterations, 1, 0},
-                                               {&estimate.max_num_ransac_iterations, 1, 0},
-                                               {&estimate.max_num_first_poses, 1, 100},
-                                               {&refine.max_num_refine_iterations, 1, 0},
-                                               {&accept.min_num_features, 4, 0},
-                                               {&accept.min_num_matches, 4, 0},
-                                               {&accept.min_num_unguided_inliers, 4, 0},
-                                               {&accept.min_num_inliers, 5, 0},
-                                               {&accept.spread_grid, 1, 1000},
-                                               {&accept.min_num_cells, 1, 0},
-                                               {&accept.num_second_pose_iterations, 1, 0},
-                                               {&options.sure_num_unguided_inliers, 0, 0},
-                                               {&options.fall_back_max_num_landmarks, 0, 0}}) {
-    const int usual = *value;
-    *value = least;
-    EXPECT_TRUE(is_allowed()) << least;
-    *value = least - 1;
-    EXPECT_FALSE(is_allowed()) << least;
-    if (most > 0) {
-      *value = most;
-      EXPECT_TRUE(is_allowed()) << most;
-      *value = most + 1;
-      EXPECT_FALSE(is_allowed()) << most;
-    }
-    *value = usual;
-  }
+  ExpectLimits<LocalizerOptions>({{"keypoint_sigma_px", "0.001", "0.0009"},
+                                  {"keypoint_sigma_per_scale", "0", "-0.001"},
+                                  {"max_num_candidates", "1", "0"},
+                                  {"min_score_ratio", "0", "-0.001", "1", "1.001"},
+                                  {"max_word_angle_rad", "0.001", "0.0009"},
+                                  {"max_word_ratio", "0.001", "0.0009", "1", "1.001"},
+                                  {"max_num_regions", "1", "0"},
+                                  {"prior_distance_m", "0", "-0.001"},
+                                  {"prior_angle_deg", "0", "-0.001", "180", "180.001"},
+                                  {"max_ratio", "0.001", "0.0009", "1", "1.001"},
+                                  {"max_angle_rad", "0.001", "0.0009"},
+                                  {"guided_radius_px", "0.1", "0.09"},
+                                  {"guided_radius_sigmas", "0", "-0.001"},
+                                  {"guided_max_angle_rad", "0.001", "0.0009"},
+                                  {"guided_max_scale_ratio", "1", "0.999"},
+                                  {"guided_num_images", "0", "-1"},
+                                  {"guided_widest", "1", "0.999", "64", "64.001"},
+                                  {"guided_sure_num_inliers", "0", "-1"},
+                                  {"guided_max_num_rounds", "1", "0"},
+                                  {"max_error_px", "0.001", "0.0009"},
+                                  {"confidence", "0.01", "0.009", "0.999999", "0.9999999"},
+                                  {"min_num_ransac_iterations", "1", "0"},
+                                  {"max_num_ransac_iterations", "1", "0"},
+                                  {"max_num_first_poses", "1", "0", "100", "101"},
+                                  {"robust_scale", "0.001", "0.0009"},
+                                  {"max_num_refine_iterations", "1", "0"},
+                                  {"inlier_chi_square", "0.001", "0.0009"},
+                                  {"covariance_scale", "1e-9", "9e-10"},
+                                  {"keypoint_correlation", "0", "-0.001", "1", "1.001"},
+                                  {"systematic_sigma_m", "0", "-0.001"},
+                                  {"systematic_sigma_deg", "0", "-0.001"},
+                                  {"min_num_features", "4", "3"},
+                                  {"min_num_matches", "4", "3"},
+                                  {"min_num_unguided_inliers", "4", "3"},
+                                  {"min_num_inliers", "5", "4"},
+                                  {"min_kept_ratio", "0", "-0.001", "1", "1.001"},
+                                  {"min_guided_sigmas", "0", "-0.001"},
+                                  {"min_probability", "0", "-0.001", "1", "1.001"},
+                                  {"spread_grid", "1", "0", "1000", "1001"},
+                                  {"min_num_cells", "1", "0"},
+                                  {"max_sigma_m", "1e-6", "9e-7"},
+                                  {"max_sigma_deg", "1e-6", "9e-7"},
+                                  {"max_up_sigmas", "0.1", "0.09"},
+                                  {"max_distance_from_survey_m", "0", "-0.001"},
+                                  {"max_second_pose_ratio", "0", "-0.001", "1", "1.001"},
+                                  {"num_second_pose_iterations", "1", "0"},
+                                  {"second_pose_distance_m", "1e-6", "9e-7"},
+                                  {"second_pose_angle_deg", "1e-6", "9e-7"},
+                                  {"min_look_alike_odds", "1", "0.999"},
+                                  {"floor_up_sigma_deg", "0.01", "0.009", "90", "90.001"},
+                                  {"budget_ms", "0", "-0.001"},
+                                  {"core_speed", "0.001", "0.0009", "1000", "1000.1"},
+                                  {"sure_num_unguided_inliers", "0", "-1"},
+                                  {"fall_back_max_num_landmarks", "0", "-1"}});
 }
 
 // As many unguided inliers as are asked for are enough, and one less is not.
@@ -478,6 +451,29 @@ TEST(Localizer, AFixThatIsNotSureIsHeldAgainstOtherLandmarks) {
   EXPECT_EQ(num_attempts, 1);
   EXPECT_EQ(localize(sure.num_unguided_inliers).second, 1);
   EXPECT_GT(localize(sure.num_unguided_inliers + 1).second, 1);
+}
+
+// Of the matches that agree on the first pose some are beyond what the noise explains.
+TEST(Localizer, AFixThatRefinementLeavesLittleOfIsRefused) {
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  const auto localize = [&](double min_kept_ratio) {
+    LocalizerOptions options;
+    options.match.guided_num_images = 0;
+    options.accept.min_kept_ratio = min_kept_ratio;
+    options.fall_back_to_all = false;
+    options.first_landmarks = "images";
+    return *Localizer(RoomMap(), options).LocalizeFeatures(features, Room().camera);
+  };
+  const Localization found = localize(0.5);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  ASSERT_LT(found.num_inliers, found.num_unguided_inliers);
+  const double kept = static_cast<double>(found.num_inliers) / found.num_unguided_inliers;
+  EXPECT_TRUE(localize(kept - 0.001).has_fix());
+  EXPECT_EQ(localize(kept + 0.001).reason, NoFix::kTooFewInliers);
+  const Localization refused = localize(1);
+  EXPECT_EQ(refused.reason, NoFix::kTooFewInliers);
+  EXPECT_THAT(refused.message, testing::HasSubstr("are left after refinement; at least 100 % are needed"));
+  EXPECT_EQ(refused.probability, 0);
 }
 
 TEST(Localizer, AVotedFixThatIsNotSureIsHeldAgainstOtherLandmarks) {

@@ -1,6 +1,9 @@
 #include "runtime/localize/place_evidence.h"
 
 #include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -89,6 +92,26 @@ TEST_F(EvidenceOfPlaceTest, WhatWasNotLookedForIsNotExpected) {
   EXPECT_EQ(evidence.num_cells_found, 2);
   query_.min_scale_px = 2.001;
   EXPECT_DOUBLE_EQ(Evidence({0, 1, 2}).num_expected, 1);
+}
+
+// A rig's second camera is turned by 15 degrees, for which no survey image is: it sees 1, 2 and 5, and counts
+// half as much.
+TEST_F(EvidenceOfPlaceTest, CamerasOfARigCountByHowNearTheSurveyIsToThem) {
+  std::vector<Query> rig = {query_, query_};
+  rig[1].cam_from_rig = PoseAt({0, 0, 0}, 75) * PoseAt({0, 0, 0}, 90).Inverse();
+  const auto map = *Map::FromRows(rows_);
+  PooledVector<Correspondence> matches = {{.keypoint = 0, .landmark = 0}, {.keypoint = 1, .landmark = 1}};
+  for (const int turned : {1, 0}) {
+    for (Correspondence& match : matches) match.image = 1 - turned;
+    const PlaceEvidence evidence =
+        *EvidenceOfPlace(*map, Sighting(std::span<const Query>(rig)), PoseAt({0, 0, 0}, 90),
+                         **map->AllLandmarks(), matches, 17, 10);
+    EXPECT_NEAR(evidence.squared_distance, 0, 1e-9);
+    EXPECT_NEAR(evidence.num_expected, 4 + 0.5 * 3, 1e-6);
+    EXPECT_NEAR(evidence.num_cells_expected, 4 + 0.5 * 3, 1e-6);
+    EXPECT_NEAR(evidence.num_cells_found, 2, 1e-6);
+    std::swap(rig[0], rig[1]);
+  }
 }
 
 TEST_F(EvidenceOfPlaceTest, WithoutAnythingFoundNothingIsKnown) {

@@ -61,6 +61,11 @@ TEST(Retrieve, LandmarksOfRegionsAndImagesAreUnions) {
   EXPECT_THAT(*LandmarksOfRegions(*map, std::vector{1, 0}), ElementsAre(0, 1, 2));
   EXPECT_THAT(*LandmarksOfImages(*map, std::vector{0, 2}), ElementsAre(0, 1, 2));
   EXPECT_THAT(*LandmarksOfImages(*map, std::vector{2}), ElementsAre(2));
+  // No more than may be, of the first images: after one that has too many there is no smaller one.
+  EXPECT_THAT(*LandmarksOfImages(*map, std::vector{0, 1, 2}, 3), ElementsAre(0, 1));
+  EXPECT_THAT(*LandmarksOfImages(*map, std::vector{0, 1, 2}, 5), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*LandmarksOfImages(*map, std::vector{1, 2}, 1), ElementsAre(0, 1, 2))
+      << "those of one at least";
 }
 
 TEST(Retrieve, NearestViewsAreNearByPlaceAndAngle) {

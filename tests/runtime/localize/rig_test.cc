@@ -239,6 +239,10 @@ TEST(Rig, WhatIsNoRigIsRefused) {
   std::vector<RigFeatures> images = See(truth, Mast(2), {}, 9);
   images[1].cam_from_rig.rotation.coeffs() *= 2;
   expect(localizer.LocalizeRigFeatures(images), "is no pose");
+  images[1].cam_from_rig.rotation.coeffs() *= 0.5 * 1.0011;
+  expect(localizer.LocalizeRigFeatures(images), "is no pose");
+  images[1].cam_from_rig.rotation.coeffs() *= 1.0009 / 1.0011;  // as a file may state it
+  EXPECT_TRUE(localizer.LocalizeRigFeatures(images).ok());
   images[1].cam_from_rig = Pose();
   images[1].cam_from_rig.translation.x() = std::nan("");
   expect(localizer.LocalizeRigFeatures(images), "is no pose");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -145,6 +146,27 @@ TEST(MotionSinceFix, ErrorsOfWheelsAreInTheCovarianceHoweverOftenTheyAreRead) {
   }
 }
 
+TEST(WheelCovariance, IsThatOfHalfMetresAndOfTwentyDegrees) {
+  const WheelErrorOptions errors{.wheel_way_ratio = 0.1, .wheel_turn_ratio = 0.2, .wheel_drift_deg = 3};
+  // Two metres to the left are four times half a metre, each of 5 cm; beside it a third of that.
+  const Eigen::Matrix3d straight = WheelCovariance({{0, 2}, 0}, errors);
+  EXPECT_NEAR(straight(1, 1), 4 * 0.05 * 0.05, 1e-12);
+  EXPECT_NEAR(straight(0, 0), 4 * 0.05 * 0.05 / 9, 1e-12);
+  EXPECT_NEAR(straight(0, 1), 0, 1e-12);
+  EXPECT_NEAR(straight(2, 2), 4 * RadFromDeg(3) * RadFromDeg(3), 1e-12);
+  // Sixty degrees are three times twenty, each of four degrees, to either side.
+  for (const double turn_deg : {60.0, -60.0}) {
+    const Eigen::Matrix3d turned = WheelCovariance({{0, 0}, RadFromDeg(turn_deg)}, errors);
+    EXPECT_NEAR(turned(2, 2), 3 * RadFromDeg(4) * RadFromDeg(4), 1e-12);
+    EXPECT_TRUE(turned.topRows<2>().isZero(0));
+  }
+  // Ahead and to the left at once: errors along the way are those of both axes.
+  const Eigen::Matrix3d oblique = WheelCovariance({{1, 1}, 0}, errors);
+  const double along = std::sqrt(8) * 0.05 * 0.05;
+  EXPECT_NEAR(oblique(0, 0), along * 5 / 9, 1e-12);
+  EXPECT_NEAR(oblique(0, 1), along * 4 / 9, 1e-12);
+}
+
 TEST(MotionSinceFix, StepsOfWhichNothingIsToldAddUp) {
   MotionSinceFix motion(PoseAt({1, 2, 1}, 40), Matrix6d::Zero());
   for (int i = 0; i < 3; ++i) motion.AddUnknown(Pose(), 0.1, 2);
@@ -232,6 +254,28 @@ TEST(DarkRoom, FramesOfWhichNothingIsToldMakeItLessCertain) {
   EXPECT_GE(told_m, RegionTrackerOptions().min_prior_sigma_m);
   ShowNothing(&tracker);
   EXPECT_GE(tracker.Prediction()->sigma_m, RegionTrackerOptions().step_sigma_m);
+}
+
+// By odometry a prediction is as certain as the fix and the wheels, but no more than fixes are.
+TEST(DarkRoom, PredictionsByOdometryAreAsCertainAsWhatTheyComeFrom) {
+  RegionTracker tracker(RoomMap());
+  ASSERT_TRUE(Show(&tracker, 0).has_fix());
+  ASSERT_TRUE(tracker.Move({0.1, 0}, 0).ok());
+  EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_m, RegionTrackerOptions().min_prior_sigma_m);
+  EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_deg, RegionTrackerOptions().min_prior_sigma_deg);
+  Matrix6d covariance = Matrix6d::Identity() * 1e-8;
+  covariance(1, 1) = RadFromDeg(7) * RadFromDeg(7);
+  ASSERT_TRUE(tracker.Move({Pose(), covariance}).ok());
+  EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_m, RegionTrackerOptions().min_prior_sigma_m);
+  EXPECT_NEAR(tracker.Prediction()->sigma_deg, 7, 0.05);
+  covariance = Matrix6d::Identity() * 1e-8;
+  covariance(3, 3) = 0.4 * 0.4;
+  ASSERT_TRUE(tracker.Move({Pose(), covariance}).ok());
+  EXPECT_NEAR(tracker.Prediction()->sigma_m, 0.4, 0.005);
+  ASSERT_TRUE(tracker.Move({Pose(), covariance}).ok());
+  EXPECT_NEAR(tracker.Prediction()->sigma_m, 0.4 * std::sqrt(2), 0.005);
+  ASSERT_TRUE(tracker.Move({Pose(), covariance}).ok());
+  EXPECT_FALSE(tracker.Prediction()) << "0.69 m, and 0.6 are the most";
 }
 
 TEST(DarkRoom, AKidnappedRobotIsFoundThoughItsWheelsStoodStill) {

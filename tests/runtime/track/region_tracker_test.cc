@@ -7,6 +7,7 @@
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/landmark_set.h"
 #include "runtime/track/region_votes.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/room_drive.h"
 
 namespace cairn {
@@ -134,6 +135,24 @@ TEST(RegionTracker, BadFramesAreErrorsAndChangeNothing) {
   EXPECT_EQ(tracker.TrackFeatures(torn, Room().camera).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(tracker.Track(cv::Mat(10, 10, CV_8UC1), Room().camera).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(Show(tracker, OnDrive(2), 2)->scope, Scope::kTrack);
+}
+
+TEST(RegionTracker, OptionsHaveTheirRanges) {
+  ExpectLimits<RegionTrackerOptions>({{"step_sigma_m", "1e-6", "9e-7"},
+                                      {"step_sigma_deg", "1e-6", "9e-7"},
+                                      {"max_prior_sigma_m", "1e-6", "9e-7"},
+                                      {"min_prior_sigma_m", "1e-6", "9e-7"},
+                                      {"min_prior_sigma_deg", "1e-6", "9e-7"},
+                                      {"max_num_sigmas", "1e-6", "9e-7"},
+                                      {"max_num_neighbour_regions", "0", "-1"},
+                                      {"readout_ratio", "0", "-0.001", "1", "1.001"},
+                                      {"max_num_fine_features", "0", "-1"},
+                                      {"fine_radius_px", "0.1", "0.09"},
+                                      {"wheel_way_ratio", "0", "-0.001", "10", "10.001"},
+                                      {"wheel_way_sigma_m", "1e-6", "9e-7"},
+                                      {"wheel_turn_ratio", "0", "-0.001", "10", "10.001"},
+                                      {"wheel_turn_sigma_deg", "1e-6", "9e-7"},
+                                      {"wheel_drift_deg", "0", "-0.001", "90", "90.001"}});
 }
 
 TEST(RegionTracker, VotesGoToTheRegionThatHasMost) {

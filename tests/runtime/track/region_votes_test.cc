@@ -7,6 +7,7 @@
 
 #include "runtime/map/landmark_set.h"
 #include "runtime/track/region_tracker.h"
+#include "tests/option_limits.h"
 #include "tests/runtime/localize/region_room.h"
 
 namespace cairn {
@@ -107,12 +108,9 @@ TEST(VoteForRegions, WithoutCandidatesSaysWhatWasFoundAndNeeded) {
 }
 
 TEST(VoteForRegions, OptionsOutOfTheirRangeAreRefused) {
-  VoteOptions options;
-  EXPECT_TRUE(CheckOptions(DescribeOptions(&options)).ok());
-  options.min_vote_ratio = 1.5;
-  EXPECT_FALSE(CheckOptions(DescribeOptions(&options)).ok());
-  options = {.min_num_votes = 0};
-  EXPECT_FALSE(CheckOptions(DescribeOptions(&options)).ok());
+  ExpectLimits<VoteOptions>({{"min_num_votes", "1", "0"},
+                             {"min_vote_ratio", "0.001", "0.0009", "1", "1.001"},
+                             {"max_num_voted_regions", "1", "0"}});
 }
 
 const RegionTrackerOptions kVotesAlone{.votes = {.localize_when_lost = false}};
